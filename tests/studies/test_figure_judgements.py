@@ -47,6 +47,8 @@ def _every(prefix: str, value: float) -> Numbers:
 
 CASES: dict[str, list[tuple[Numbers, State]]] = {
     "M5": [
+        ({"liang_cooling_share_above_finish": 1.0, "brinson_cooling_share_above_finish": 1.0}, HOLDS),
+        ({"liang_cooling_share_above_finish": 1.0}, IN_PART),
         ({"liang_crosses_cooling": 0.0}, FAILS),
         ({"brinson_missed_warming_C": -0.05}, FAILS),
         ({"brinson_end_temperature_above_finish_C": -0.1}, FAILS),
@@ -149,8 +151,8 @@ CASES: dict[str, list[tuple[Numbers, State]]] = {
         ({"short_at_K_10_deg": 0.9}, FAILS),
     ],
     "C17": [
-        ({"offset_K1_0.2_deg": 1.5, "offset_K1_0.3_deg": 1.5}, HOLDS),
-        ({"offset_K1_0.2_deg": 1.5, "offset_K1_0.3_deg": 0.9}, IN_PART),
+        ({"changes_K1_400": 20.0}, FAILS),
+        ({"changes_K1_3": 3.0}, FAILS),
         ({"hanging_K1_0.2_deg": 2.9}, FAILS),
         ({"hanging_K1_150_deg": 0.6}, FAILS),
     ],
@@ -160,7 +162,7 @@ CASES: dict[str, list[tuple[Numbers, State]]] = {
         ({"settling_0.5_I_s": 40.0}, FAILS),
     ],
 }
-KEPT_IN_PART = {"C2", "C9", "C10", "C12", "C16", "C17"}
+KEPT_IN_PART = {"M5", "C2", "C4", "C9", "C10", "C12", "C16"}
 
 
 @pytest.mark.parametrize("name", CASES)
