@@ -43,6 +43,9 @@ ALLOWED_EXCESS = (
 SETTLED = 0.05  # relative change of the error of a sample
 DETECTABLE = 1.0  # standard errors that an effect of one width has to change the runs by to be looked for
 CERTAIN = 100.0  # nats that the linear model loses without an effect, beyond which no refit makes up for it
+UNEXPLAINED = (
+    2.0  # noises that an independent sample may be off by, from which each of the likeliest others is fitted at the end
+)
 REPLACED = 2  # other effects that are tried in the place of each at the end
 NEIGHBOURS = 12  # of these sets and those without an effect, the likeliest in the linear model
 SETTLED_ODDS = 1.0  # log odds: a model that is likelier by less is as likely, and the average has both
@@ -119,7 +122,7 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
         search.joint = dataclasses.replace(search.joint, width_factors=present.width_factors)
         linear, traces = _linear(search, present, error)
         last = present.effects in checked
-        sets = _neighbours(linear, present) if last else _promising(search, linear, present, error)
+        sets = _neighbours(search, linear, present, error) if last else _promising(search, linear, present, error)
         if sets:
             _fit(search, sets, linear, traces, error, number)
         best, before = search.best(error), present.log_evidence(error**2)
@@ -142,7 +145,8 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
         settled, error = abs(np.log(now / error)) < SETTLED, now
         alike = last and done.best_gain < SETTLED_ODDS
         if alike or (not moved and settled):
-            if last or not present.effects or not search.thorough:
+            explained = not present.effects and error < UNEXPLAINED * search.noise
+            if last or explained or not search.thorough:
                 break
             checked.add(present.effects)
     search.winner = present.effects
@@ -211,22 +215,29 @@ def _promising(search: JointSearch, linear: LinearModel, present: FittedModel, e
     return list(sets.values())
 
 
-def _neighbours(linear: LinearModel, present: FittedModel) -> list[Subset]:
-    """The present model without each of its effects, and with the likeliest others in the place of each."""
+def _neighbours(search: JointSearch, linear: LinearModel, present: FittedModel, error: float) -> list[Subset]:
+    """The present model without each of its effects, with the likeliest others in the place of each, and, while much is left, with the likeliest beside them.
+
+    A sample may then be off by so much that the linear model tells effects hardly apart, and one that is far from linear comes late in it.
+    """
     here: Subset = frozenset(Variant(effect, -1) for effect in present.effects)
-    sets = []
+    others = [one for one in linear.places if one.effect not in present.effects]
+
+    def likeliest(rest: Subset) -> list[Subset]:
+        return sorted((rest | {one} for one in others), key=lambda one: -linear.log_evidence(one))
+
+    near: list[Subset] = []
     for gone in here:
-        rest = here - {gone}
-        if linear.log_evidence(rest) > linear.log_evidence(here) - CERTAIN:
-            sets.append(rest)
-        others = [one for one in linear.places if one.effect not in present.effects]
-        likeliest = sorted(others, key=lambda one: -linear.log_evidence(rest | {one}))
-        sets += [
-            rest | {one}
-            for one in likeliest[:REPLACED]
-            if linear.log_evidence(rest | {one}) > linear.log_evidence(here) - CERTAIN
-        ]
-    return sorted(sets, key=lambda one: -linear.log_evidence(one))[:NEIGHBOURS]
+        near += [here - {gone}, *likeliest(here - {gone})[:REPLACED]]
+    near = [one for one in near if linear.log_evidence(one) > linear.log_evidence(here) - CERTAIN]
+    near = sorted(near, key=lambda one: -linear.log_evidence(one))[:NEIGHBOURS]
+    if error < UNEXPLAINED * search.noise:
+        return near
+    beside: dict[tuple[str, ...], Subset] = {}
+    for one in likeliest(here):
+        if np.isfinite(linear.log_evidence(one)) and _effects(search, one) not in search.fitted:
+            beside.setdefault(_effects(search, one), one)
+    return [*near, *list(beside.values())[:NEIGHBOURS]]
 
 
 def _fit(
@@ -329,6 +340,14 @@ def comparison_settings(settings: FitSettings, stage: str) -> FitSettings:
         allowed_excess=ALLOWED_EXCESS,
         stage=stage,
     )
+
+
+def fitted_from(search: JointSearch, model: FittedModel) -> FittedModel:
+    """The effects of `model`, fitted with every free parameter of `search` from its values; among the fitted ones from then on."""
+    error = search.error(model)
+    stage = "fitting the base model with the values of presets free"
+    _fit_side_by_side(search, [(model.effects, model.values)], error, stage, ())
+    return search.fitted[model.effects]
 
 
 def refined(search: JointSearch, model: FittedModel, error: float) -> FittedModel:

@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 
 from smajax.attribution.findings import LikelierModel, NoLikelierModel, Reason, Round, StepDependent
-from smajax.attribution.joint_search import JointRound, JointSearch, refined, search_jointly
+from smajax.attribution.joint_search import JointRound, JointSearch, fitted_from, refined, search_jointly
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model
 from smajax.attribution.leave_one_run_out import predicting
 from smajax.attribution.model_fits import Evidence, Model, Search, Start
@@ -24,6 +24,9 @@ from smajax.model.effects.library import LIBRARY
 from smajax.model.effects.prior_width import CoefficientPrior
 
 LIKELIEST = 4  # sets of effects from which the search goes on with the values of presets free
+FREED_SHARE = (
+    2.0 / 3.0
+)  # of the base model's error: what the values of presets lower it to where the search begins with them free
 SETTLED_COST = 1e-4  # of twice the log-likelihood: the optimum to within a hundredth of a standard error
 
 
@@ -73,14 +76,24 @@ class _Stage:
         return self.resumed(search, instead)
 
     def _from_base(self, base: np.ndarray, programs: tuple[tuple[str, ...], ...]) -> tuple[JointSearch, FittedModel]:
-        """(the search, likeliest model): first with the values of presets held, then, from the likeliest sets of effects, with these free as well.
+        """(the search, likeliest model), from the base model. `programs`: those that are compiled already.
 
-        From the base model alone fits that free them too end in local minima. `programs`: those that are compiled already.
+        The values of presets are free from the beginning where they alone lower the base model's error much: with wrong values held, effects that
+        are not there are named in their place. Elsewhere they are held at first and free from the likeliest sets of effects on, for
+        from the base model alone fits that free them too may end in local minima.
         """
-        search = self.joint_search({})
-        search.programs = programs
-        found = search_jointly(search, {(): base})
-        return self.resumed(search, found) if self.setting.presets else (search, found)
+        held = self.joint_search({})
+        held.programs = programs
+        if not self.setting.presets:
+            return held, search_jointly(held, {(): base})
+        free = self.joint_search(self.setting.presets)
+        free.programs = programs
+        before = fitted_model(held.joint, (), base, ())
+        after = fitted_from(free, before)
+        if after.rms < FREED_SHARE * before.rms:
+            return free, search_jointly(free, {(): after.values})
+        held.programs = free.programs
+        return self.resumed(held, search_jointly(held, {(): base}))
 
     def _leaves_noise(self, model: FittedModel) -> bool:
         mask = np.asarray(self.setting.problem.batch.mask)
