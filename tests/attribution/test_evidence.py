@@ -150,19 +150,25 @@ def test_values_of_a_preset_are_free_within_their_widths_unless_the_file_gives_t
     assert "damping" not in free
     for name, prior in free.items():
         assert prior.base == values[name]
-        assert prior.logarithmic
-        assert 0.0 < prior.sigma <= 1.0
+        assert prior.logarithmic == (name != "thermal_modulus")
+        assert 0.0 < prior.deviation(1.2 * values[name]) < 2.0
     boxes = preset_bounds(free, {name: (table[name].low, table[name].high) for name in free})
     for name, (low, high) in boxes.items():
-        assert max(0.0, table[name].low) <= low < values[name] < high <= table[name].high
-    assert boxes["thermal_modulus"][0] > 0.0  # at zero there is no logarithm
-    lengthening = parameter_values(build("flexinol_table_3_2_expanding", "dead_weight", "voltage"))["thermal_modulus"]
-    below_zero = preset_priors(table, {**values, "thermal_modulus": lengthening}, frozenset())["thermal_modulus"]
-    assert below_zero.base == lengthening
-    assert below_zero.sigma == pytest.approx(-0.2 * lengthening)
+        assert table[name].low <= low < values[name] < high <= table[name].high
+        assert low > 0.0 or name == "thermal_modulus"  # at zero there is no logarithm
+    # Whichever sign the preset has, the wire may have the other one.
+    for preset in ("flexinol_table_3_2", "flexinol_table_3_2_expanding"):
+        own = parameter_values(build(preset, "dead_weight", "voltage"))["thermal_modulus"]
+        prior = preset_priors(table, {**values, "thermal_modulus": own}, frozenset())["thermal_modulus"]
+        assert prior.base == own
+        assert prior.sigma == pytest.approx(1.1 * abs(own))
+        assert not prior.logarithmic
+        low, high = preset_bounds({"thermal_modulus": prior}, {"thermal_modulus": (-1e9, 1e9)})["thermal_modulus"]
+        assert low < -0.8e6
+        assert high > 0.55e6
+    below_zero = preset_priors(table, {**values, "damping": -1.0}, frozenset())["damping"]
     assert not below_zero.logarithmic
-    low, high = preset_bounds({"thermal_modulus": below_zero}, {"thermal_modulus": (-1e9, 1e9)})["thermal_modulus"]
-    assert low < lengthening < high < 0.0
+    assert below_zero.sigma == pytest.approx(2.0)
     known = {name for wire in WIRES for load in LOADS for name in _names(wire, load)}
     assert set(RELATIVE) <= known
     assert all(source for _, source in RELATIVE.values())
