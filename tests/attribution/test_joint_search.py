@@ -48,6 +48,19 @@ def test_an_effect_that_is_there_is_found_with_its_size() -> None:
     assert sum(value for effects, value in probabilities.items() if "latent_heat" in effects) > 0.99
 
 
+def test_while_much_is_left_each_likely_effect_is_fitted_before_the_search_ends(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The linear model may rank an effect that is far from linear behind others; here it offers none at all until the end."""
+    promising = joint_search._promising
+    monkeypatch.setattr(
+        joint_search, "_promising", lambda *given: promising(*given) if given[2].effects else [], raising=True
+    )
+    search, values, _ = _found({"latent_heat.enthalpy": 1.2e4})
+    assert set(values) == {"latent_heat.enthalpy"}
+    assert len(search.rounds[1].gains) > joint_search.FITTED
+
+
 @pytest.mark.slow
 def test_two_effects_are_found_together() -> None:
     _, values, errors = _found(

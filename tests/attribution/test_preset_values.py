@@ -23,16 +23,16 @@ NOISE = 1e-4  # m
 NAME, WRONG = "young_modulus_martensite", 1.6
 
 
-def _bench() -> tuple[Experiment, float]:
-    """Runs of the demo's bench by a wire whose martensite is stiffer than the preset's by more than half; (experiment, its modulus)."""
+def _bench(name: str = NAME, share: float = WRONG) -> tuple[Experiment, float]:
+    """Runs of the demo's bench by a wire of which one value is `share` times the preset's, which the file does not give; (experiment, that value)."""
     with resources.as_file(resources.files("smajax") / "data" / "demo" / "complete") as folder:
         experiment = load_experiment(folder / "experiment.toml", CATALOGUE)
     known = {name: value for name, value in experiment.parameters.items() if name not in RELATIVE}
     experiment = dataclasses.replace(experiment, parameters=known)
     model = base_model(experiment)
-    true = WRONG * float(get_parameters(model, [NAME])[0])
+    true = share * float(get_parameters(model, [name])[0])
     batch = pack(experiment.runs, experiment.step, parameter_values(model), Integration(1e-4))
-    readings = np.asarray(simulate_batch(set_parameters(model, {NAME: true}), batch).reading)
+    readings = np.asarray(simulate_batch(set_parameters(model, {name: true}), batch).reading)
     random = np.random.default_rng(11)
     runs = tuple(
         dataclasses.replace(
@@ -56,6 +56,19 @@ def test_no_effect_is_named_for_a_preset_that_is_wrong(found: tuple[Findings, fl
     findings, _ = found
     assert findings.added == ()
     assert findings.verdict is Verdict.ADEQUATE
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "share"), [("thermal_modulus", -1.0), ("damping", 0.05)])
+def test_no_effect_is_named_for_a_thermal_modulus_of_the_other_sign_or_a_damping_of_a_twentieth(
+    name: str, share: float
+) -> None:
+    experiment, true = _bench(name, share)
+    findings = close_loop(dataclasses.replace(experiment, effects_only=()))
+    assert findings.added == ()
+    (found,) = [one for one in findings.after if one.name == name]
+    assert found.standard_error is not None
+    assert found.value == pytest.approx(true, abs=4.0 * found.standard_error)
 
 
 @pytest.mark.slow
