@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -16,6 +17,7 @@ from smajax.fit.sensitivity import Sensitivity
 
 # A fitted value nearer to a bound than this share of the range counts as at the bound.
 AT_BOUND = 2e-3
+ORDERS_APART = 100.0  # bounds, one over the other, of a parameter whose size is what is unknown
 # Two parameters whose estimates are correlated more than this: the runs determine one combination of them.
 CORRELATED = 0.98
 # A direction in which the scaled columns are shorter than this share of the longest is not identifiable. A parameter that
@@ -84,7 +86,9 @@ class Uncertainty:
 
 
 def at_bound(value: float, low: float, high: float, edge: float = AT_BOUND) -> Remark:
-    """At its lower bound, at its upper bound, or nothing (false)."""
+    """At its lower bound, at its upper bound, or nothing (false); bounds that are orders of magnitude apart count by their logarithms."""
+    if low > 0.0 and high > ORDERS_APART * low and value > 0.0:
+        value, low, high = math.log(value), math.log(low), math.log(high)
     span = edge * (high - low)
     if value - low < span:
         return Remark(RemarkKind.LOWER_BOUND)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from smajax.fit.sensitivity import Sensitivity
-from smajax.fit.uncertainty import identifiability, uncertainty
+from smajax.fit.uncertainty import RemarkKind, at_bound, identifiability, uncertainty
 
 BOUNDS = dict.fromkeys("abc", (-10.0, 10.0))
 VALUES = dict.fromkeys("abc", 1.0)
@@ -207,3 +207,20 @@ def test_few_independent_samples_make_no_small_error() -> None:
         assert error is not None
         z.append(estimate / error)
     assert 0.9 < np.mean(np.abs(z) < 1.96) <= 1.0
+
+
+@pytest.mark.parametrize(
+    ("value", "low", "high", "kind"),
+    [
+        (1.0, 0.05, 8000.0, RemarkKind.NONE),  # a damping, far above its lower bound by any measure but the range's
+        (0.05, 0.05, 8000.0, RemarkKind.LOWER_BOUND),
+        (7999.0, 0.05, 8000.0, RemarkKind.UPPER_BOUND),
+        (30.5, 30.0, 600.0, RemarkKind.LOWER_BOUND),
+        (1.0, 0.0, 8000.0, RemarkKind.LOWER_BOUND),  # zero has no logarithm
+        (0.5, -1.0, 1.0, RemarkKind.NONE),
+    ],
+)
+def test_bounds_that_are_orders_of_magnitude_apart_count_by_their_logarithms(
+    value: float, low: float, high: float, kind: RemarkKind
+) -> None:
+    assert at_bound(value, low, high).kind is kind
