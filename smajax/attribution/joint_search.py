@@ -4,7 +4,7 @@ Each round takes one Jacobian by the coefficients of all candidates at the likel
 effects in the linear model about it (`subset_evidence`), and fits the few best sets that have not been fitted, all
 parameters together. A set counts by the evidence of its own fit (`laplace_evidence`), never by the linear model's. It
 ends where no fitted set is likelier than the present one, and none is by more than `SETTLED_ODDS` in which one of its effects
-is removed or replaced.
+is removed or replaced, or, while much is left, one of the likeliest others added.
 
 What the present model leaves is what an independent sample may be off by: at first the residual of the base model, so
 only strong effects are added; the better the model, the finer the effects that it tells.
@@ -43,9 +43,7 @@ ALLOWED_EXCESS = (
 SETTLED = 0.05  # relative change of the error of a sample
 DETECTABLE = 1.0  # standard errors that an effect of one width has to change the runs by to be looked for
 CERTAIN = 100.0  # nats that the linear model loses without an effect, beyond which no refit makes up for it
-UNEXPLAINED = (
-    2.0  # noises that an independent sample may be off by, from which each of the likeliest others is fitted at the end
-)
+UNEXPLAINED = 2.0  # noises that a sample may be off by, from which the likeliest others are fitted beside the effects
 REPLACED = 2  # other effects that are tried in the place of each at the end
 NEIGHBOURS = 12  # of these sets and those without an effect, the likeliest in the linear model
 SETTLED_ODDS = 1.0  # log odds: a model that is likelier by less is as likely, and the average has both
@@ -343,11 +341,11 @@ def comparison_settings(settings: FitSettings, stage: str) -> FitSettings:
 
 
 def fitted_from(search: JointSearch, model: FittedModel) -> FittedModel:
-    """The effects of `model`, fitted with every free parameter of `search` from its values; among the fitted ones from then on."""
+    """The effects of `model`, fitted with every free parameter of `search` from its values; `model` where that fit has no number."""
     error = search.error(model)
     stage = "fitting the base model with the values of presets free"
     _fit_side_by_side(search, [(model.effects, model.values)], error, stage, ())
-    return search.fitted[model.effects]
+    return search.fitted.get(model.effects, model)
 
 
 def refined(search: JointSearch, model: FittedModel, error: float) -> FittedModel:

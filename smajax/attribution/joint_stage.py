@@ -24,9 +24,7 @@ from smajax.model.effects.library import LIBRARY
 from smajax.model.effects.prior_width import CoefficientPrior
 
 LIKELIEST = 4  # sets of effects from which the search goes on with the values of presets free
-FREED_SHARE = (
-    2.0 / 3.0
-)  # of the base model's error: what the values of presets lower it to where the search begins with them free
+FREED_SHARE = 2.0 / 3.0  # of the base error, to which free values of presets lower it where the search begins so
 SETTLED_COST = 1e-4  # of twice the log-likelihood: the optimum to within a hundredth of a standard error
 
 

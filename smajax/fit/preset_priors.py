@@ -38,7 +38,7 @@ RELATIVE: Mapping[str, tuple[float, str]] = {
 }
 SIGNED = frozenset(
     {"thermal_modulus"}
-)  # may have the other sign: the width is a share of the value, of a normal distribution
+)  # the sign may be the other one: a normal prior, as wide as a share of the value
 
 
 def preset_priors(

@@ -29,11 +29,9 @@ from smajax.simulation.simulate import DEFAULT_STEP
 
 HOT, COLD = "#c8553d", "#1f6fb2"
 SIZE, UPRIGHT, DPI = (8.4, 3.9), (4.4, 7.6), 80  # inches
-COLOURS, SHADES, TYPICAL = (
-    128,
-    24,
-    6,
-)  # of the picture file, those of the wire, and frames that the others are taken from
+COLOURS = 128  # of the picture file
+SHADES = 24  # of them, for the wire
+TYPICAL = 6  # frames from which the others are taken
 NEARLY_WHITE = 250
 SHADE = LinearSegmentedColormap.from_list("phase", [HOT, COLD])  # by the martensite fraction
 Run = Trajectory | xr.Dataset  # as `simulate` or as `simulate_dataset` returns it

@@ -287,6 +287,16 @@ def test_the_reason_why_the_search_ended_is_reported(reason: Reason, text: str) 
     assert reason_text(reason, "m", "position") == text
 
 
+def test_of_many_sets_that_were_fitted_a_line_has_the_likeliest() -> None:
+    compared = (("creep", -2.0, 3e-4), ("drag", 5.0, 2e-4), ("", -9.0, 4e-4), ("slack", -1.0, 3e-4))
+    reason = LikelierModel("", 5.0, compared)
+    begun = "likelier than the base model by 5.0 in log odds; fitted: "
+    line = reason_text(reason, "m", "position", 2)
+    assert line == f"{begun}drag (+5.0, error 0.2 mm), slack (-1.0, error 0.3 mm) and 2 less likely ones"
+    assert reason_text(reason, "m", "position").startswith(f"{begun}creep (-2.0, error 0.3 mm), drag")
+    assert "less likely" not in reason_text(reason, "m", "position", 4)
+
+
 def test_progress_of_the_search_is_a_message() -> None:
     events: list[Event] = []
     progress = narrated(events.append, "m", "position")

@@ -21,6 +21,8 @@ from smajax.report.narrative.unknown import comparison_sentence
 from smajax.report.narrative.values import error_text
 from smajax.report.narrative.verdict import summary
 
+LISTED = 3  # sets of effects in the line of a round; the page has all
+
 
 @dataclass(frozen=True)
 class Narrative:
@@ -67,7 +69,7 @@ def narrated(progress: Progress, unit: str, quantity: str) -> Progress:
         if isinstance(event, Result) and isinstance(event.record, Round):
             done = event.record
             text = chosen_text(done) or "nothing added"
-            progress(Message(f"round {done.number}: {text}; {reason_text(done.reason, unit, quantity)}"))
+            progress(Message(f"round {done.number}: {text}; {reason_text(done.reason, unit, quantity, LISTED)}"))
         else:
             progress(event)
 

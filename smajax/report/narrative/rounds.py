@@ -23,8 +23,8 @@ def chosen_text(entry: Round) -> str:
     return f"without {entry.chosen}" if entry.removed else entry.chosen
 
 
-def reason_text(reason: Reason, unit: str, quantity: str) -> str:
-    """`unit` (SI) and `quantity` of the output."""
+def reason_text(reason: Reason, unit: str, quantity: str, most: int | None = None) -> str:
+    """`unit` (SI) and `quantity` of the output. `most`: sets of effects that are listed, the likeliest; None: all in the order of the fits."""
 
     def error(value: float) -> str:
         return value_text(value, unit, quantity)
@@ -33,9 +33,9 @@ def reason_text(reason: Reason, unit: str, quantity: str) -> str:
         case StepDependent(effects, kept):
             return f"{effects} keeps {max(kept, 0.0):.0%} of its gain at half the step and is not accepted"
         case LikelierModel(before, log_odds, compared):
-            return f"likelier than {before or 'the base model'} by {log_odds:.1f} in log odds; {_compared(compared, error)}"
+            return f"likelier than {before or 'the base model'} by {log_odds:.1f} in log odds; {_compared(compared, error, most)}"
         case NoLikelierModel(compared):
-            return f"no other set of effects is likelier; {_compared(compared, error)}"
+            return f"no other set of effects is likelier; {_compared(compared, error, most)}"
         case PredictsTooLittle(share, least):
             return (
                 f"set aside: with it the model explains {share:.0%} of the motion in runs left out, and under {least:.0%} "
@@ -49,9 +49,11 @@ def reason_text(reason: Reason, unit: str, quantity: str) -> str:
             return f"set aside: error on the held-out runs {error(without)} without and {error(with_it)} with it"
 
 
-def _compared(compared: Sequence[tuple[str, float, float]], error: Callable[[float], str]) -> str:
+def _compared(compared: Sequence[tuple[str, float, float]], error: Callable[[float], str], most: int | None) -> str:
     """`fitted: latent_heat (+812.0, error 0.05 mm), ...`; log odds are over the model before."""
     if not compared:
         return "none was worth a fit"
-    parts = [f"{effects or 'the base model'} ({odds:+.1f}, error {error(rms)})" for effects, odds, rms in compared]
-    return f"fitted: {', '.join(parts)}"
+    listed = compared if most is None else sorted(compared, key=lambda one: -one[1])[:most]
+    parts = [f"{effects or 'the base model'} ({odds:+.1f}, error {error(rms)})" for effects, odds, rms in listed]
+    left = len(compared) - len(listed)
+    return f"fitted: {', '.join(parts)}{f' and {left} less likely ones' if left else ''}"
