@@ -19,12 +19,13 @@ from smajax.core.progress import BestFit, Compiling, Message, Stage, WarningMess
 
 # In the place of `smajax`: it writes events until it is told to end, by a file or by Ctrl-C.
 COMMAND = """
-import json, pathlib, sys, time
+import json, os, pathlib, sys, time
 def say(**event): print(json.dumps({**event, "at": time.time()}), file=sys.stderr, flush=True)
 try:
     say(event="Stage", name="fitting", share=0.25)
     done = pathlib.Path("count")
-    done.write_text(str(int(done.read_text()) + 1 if done.exists() else 1))
+    pathlib.Path("new").write_text(str(int(done.read_text()) + 1 if done.exists() else 1))
+    os.replace("new", done)  # whole at once: Ctrl-C comes as soon as it is there
     while not pathlib.Path("end").exists():
         time.sleep(0.01)
     if "bad" in sys.argv:
