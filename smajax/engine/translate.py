@@ -25,7 +25,7 @@ from smajax.engine.array_operations import (
     reduced,
     whole_number,
 )
-from smajax.engine.by_numpy import by_jax, by_numpy
+from smajax.engine.by_numpy import computed
 from smajax.engine.equations import Read, Step, array_of, note, read_of, steps_of
 from smajax.engine.expansions import EXPANSIONS
 from smajax.engine.jax_versions import TABLE, expanded, opened
@@ -70,15 +70,6 @@ def _constants(consts: Sequence[Any]) -> list[Value]:
         return [_numbers(one) for one in consts]
     except TypeError:
         raise Unsupported("a constant that is no array of numbers") from None
-
-
-def _plainly(equation: Any, given: Sequence[Value]) -> np.ndarray | None:
-    """The result of an operation on known arrays by numpy, of the shape and the kind of number that JAX says; None where JAX has to do it."""
-    if any(name_of(one.aval.dtype).startswith("key<") for one in (*equation.invars, *equation.outvars)):
-        return None
-    out = equation.outvars[0].aval
-    result = by_numpy(equation.primitive.name, equation.params, [np.asarray(one) for one in given])
-    return result if result is not None and (result.shape, result.dtype) == (out.shape, out.dtype) else None
 
 
 def _as_shape(lanes: Held, shape: tuple[int, ...]) -> np.ndarray:
@@ -155,10 +146,7 @@ class _Translation:
         if name in EXPANSIONS and not (name in ("threefry2x32", "erf_inv") and all(map(is_known, given))):
             return self.closed(expanded(equation), given)
         if all(map(is_known, given)):
-            plain = _plainly(equation, given)
-            if plain is not None:
-                return [plain]
-            return [_numbers(one) for one in by_jax(equation.primitive, equation.params, given)]
+            return [_numbers(one) for one in computed(equation, given)]
         out = array_of(equation.outvars[0].aval)
         kinds = [name_of(one.aval.dtype) for one in equation.invars]
         if name == "gather" and "FILL" in str(params["mode"]) and not at_known_places(name, given):

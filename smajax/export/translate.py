@@ -12,11 +12,10 @@ from math import prod
 from typing import Any
 
 import jax.extend as jex
-import jax.numpy as jnp
 import numpy as np
 
 from smajax.engine.array_operations import MOVES, REDUCTIONS
-from smajax.engine.by_numpy import by_jax, by_numpy
+from smajax.engine.by_numpy import computed
 from smajax.engine.expansions import EXPANSIONS
 from smajax.engine.jax_versions import TABLE, expanded, kind_of, opened, parameters_of, refuse_unread
 from smajax.engine.text import Unsupported
@@ -103,11 +102,7 @@ class Translation:
 
     def folded(self, equation: Any, given: list[Value]) -> list[Value]:
         """Of known numbers, computed now."""
-        arrays = [np.asarray(one) for one in given]
-        plain = by_numpy(equation.primitive.name, equation.params, arrays)
-        if plain is not None and (plain.shape, str(plain.dtype)) == kind_of(equation.outvars[0].aval):
-            return [plain]
-        return [np.asarray(one) for one in by_jax(equation.primitive, equation.params, list(map(jnp.asarray, arrays)))]
+        return [np.asarray(one) for one in computed(equation, [np.asarray(one) for one in given])]
 
     def elementwise(self, name: str, params: dict[str, Any], given: list[Value], shape: Any, dtype: str) -> Value:
         """Arithmetic, entry by entry; a predicate, the ends of `clamp` and axes of length one may stand for all."""

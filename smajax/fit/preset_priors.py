@@ -36,9 +36,8 @@ RELATIVE: Mapping[str, tuple[float, str]] = {
         "no sheet gives it; the presets' is chosen so that nothing rings, and a bearing has a hundredth of it",
     ),
 }
-SIGNED = frozenset(
-    {"thermal_modulus"}
-)  # the sign may be the other one: a normal prior, as wide as a share of the value
+# The sign may be the other one: a normal prior, as wide as a share of the value.
+SIGNED = frozenset({"thermal_modulus"})
 
 
 def preset_priors(
