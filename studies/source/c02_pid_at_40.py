@@ -38,13 +38,10 @@ def work(fast: bool) -> Result:
         "worst_error_below_after_40_s_deg": worst_error(later, -90.0, 40.0),
         "worst_error_above_after_40_s_deg": worst_error(later, 40.0),
     }
-    state = judged(numbers)
-    return Result(
-        holds=state is not State.FAILS,
+    return Result.of(
+        judged(numbers),
         in_part=f"the error elsewhere is not steady: the integral removes it in time, from {below:.1f}° and {above:.1f}° (below, above) after 10 s to "
-        f"{numbers['worst_error_below_after_40_s_deg']:.2f}° and {numbers['worst_error_above_after_40_s_deg']:.2f}° over the last fifth of {LONG:.0f} s"
-        if state is State.IN_PART
-        else "",
+        f"{numbers['worst_error_below_after_40_s_deg']:.2f}° and {numbers['worst_error_above_after_40_s_deg']:.2f}° over the last fifth of {LONG:.0f} s",
         found=f"at 40° the arm arrives after {reach:.1f} s with {overshoot(own):.2f}° of overshoot and stays within {steady(own):.2f}°; after 10 s "
         f"it is up to {below:.1f}° short of lower set points, and up to {above:.1f}° beyond higher ones, which it overshoots by up to {over:.1f}°",
         numbers=numbers,

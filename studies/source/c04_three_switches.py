@@ -34,12 +34,11 @@ def swing(loop: Recorded) -> tuple[float, float]:
     return float(np.degrees(np.ptp(loop.run.position[late]))), float(np.degrees(np.ptp(loop.run.velocity[late])))
 
 
-def comes_to_rest(loop: Recorded) -> float:
+def comes_to_rest(time: np.ndarray, degrees: np.ndarray) -> float:
     """Seconds after which the arm stays within a degree of where it ends (mean of the last fifth)."""
-    angle = np.degrees(loop.run.position)
-    off = np.abs(angle - angle[loop.run.time > 0.8 * loop.run.time[-1]].mean())
+    off = np.abs(degrees - degrees[time > 0.8 * time[-1]].mean())
     outside = np.flatnonzero(off > BAND_DEGREES)
-    return float(loop.run.time[outside[-1]]) if outside.size else 0.0
+    return float(time[outside[-1]]) if outside.size else 0.0
 
 
 def judged(numbers: Mapping[str, float]) -> State:
@@ -71,19 +70,16 @@ def work(fast: bool) -> Result:
             f"{name}_late_swing_deg": angle,
             f"{name}_late_rate_swing_deg_per_s": rate,
             f"{name}_settling_s": time_of(one.settling_time),
-            f"{name}_comes_to_rest_s": comes_to_rest(loop),
+            f"{name}_comes_to_rest_s": comes_to_rest(loop.run.time, np.degrees(loop.run.position)),
             f"{name}_overshoot_deg": overshoot(one),
             f"{name}_steady_error_deg": steady(one),
         }
     continuous = regulated(vsc2, fast)[0.0][1]
     numbers["VSC2_continuous_settling_s"] = time_of(continuous.settling_time)
     second, third = numbers["VSC2_comes_to_rest_s"], numbers["VSC3_settling_s"]
-    state = judged(numbers)
-    return Result(
-        holds=state is not State.FAILS,
-        in_part=f"VSC2's layer is in no other figure and was chosen for this one, near the printed {PRINTED['VSC2']:.0f} s: it comes to rest after {second:.1f} s"
-        if state is State.IN_PART
-        else "",
+    return Result.of(
+        judged(numbers),
+        in_part=f"VSC2's layer is in no other figure and was chosen for this one, near the printed {PRINTED['VSC2']:.0f} s: it comes to rest after {second:.1f} s",
         found=f"VSC1 still switches {numbers['VSC1_full_switches_per_s']:.0f} times a second between 4 and 10 V after {LATE:g} s, on a cycle of "
         f"{numbers['VSC1_late_swing_deg']:.2f}° by {numbers['VSC1_late_rate_swing_deg_per_s']:.0f}°/s; VSC2 overshoots by "
         f"{numbers['VSC2_overshoot_deg']:.0f}° and comes to rest after {second:.1f} s, "

@@ -45,14 +45,11 @@ def work(fast: bool) -> Result:
         "vsc_least_fraction": float(old.run.martensite_fraction.min()),
         "nvsc_least_fraction": float(new.run.martensite_fraction.min()),
     }
-    state = judged(numbers)
-    return Result(
-        holds=state is not State.FAILS,
+    return Result.of(
+        judged(numbers),
         in_part="the factor v/v_p, which is added here to eq. 4.37, does the work and not the temperature control: with K_p = 0 the wire stays "
         f"{-numbers['nvsc_without_temperature_above_finish_C']:.1f} °C below A_f' instead of {-numbers['nvsc_above_finish_C']:.1f} °C, and under eq. 4.37 as printed the arm stops "
-        f"{literal[-30.0]:.1f}° short of -30° and {literal[50.0]:.1f}° short of 50°; VSC heats to A_f' with gains that are chosen for it"
-        if state is State.IN_PART
-        else "",
+        f"{literal[-30.0]:.1f}° short of -30° and {literal[50.0]:.1f}° short of 50°; VSC heats to A_f' with gains that are chosen for it",
         found=f"under VSC the wire comes to {_side(numbers['vsc_above_finish_C'])} A_f' and the arm overshoots by {numbers['vsc_overshoot_deg']:.0f}°; "
         f"under NVSC it stays {-numbers['nvsc_above_finish_C']:.1f} °C below and the arm overshoots by {numbers['nvsc_overshoot_deg']:.1f}°",
         numbers=numbers,

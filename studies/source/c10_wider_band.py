@@ -55,15 +55,12 @@ def work(fast: bool) -> Result:
     literal = swept(nvsc_as_printed(arm()), "temperature_band", BANDS, 50.0, fast)
     printed = {band: 50.0 - float(np.degrees(loop.run.position[-1])) for band, (loop, _) in literal.items()}
     numbers |= {f"as_printed_short_at_{band:g}_C_per_s_deg": value for band, value in printed.items()}
-    state = judged(numbers)
     gone = next((band for band, value in zip(BANDS, over, strict=True) if value < GONE), np.inf)
-    return Result(
-        holds=state is not State.FAILS,
+    return Result.of(
+        judged(numbers),
         in_part="the factor v/v_p, which is added here to eq. 4.37, does the work and not the temperature control: with K_p = 0 the overshoot vanishes as well "
         f"({over_damped[30.0]:.1f}° at 30 °C/s); with eq. 4.37 as printed the arm stops {printed[20.0]:.0f}° short of 50° from 20 °C/s on, and at 10 °C/s "
-        f"overshoots by {overshoot(literal[10.0][1]):.0f}° and ends {printed[10.0]:.0f}° short"
-        if state is State.IN_PART
-        else "",
+        f"overshoots by {overshoot(literal[10.0][1]):.0f}° and ends {printed[10.0]:.0f}° short",
         found=f"the overshoot falls from {over[0]:.0f}° without a band over {numbers['overshoot_at_30_C_per_s_deg']:.1f}° at 30 °C/s "
         + (f"to less than {GONE}° from {gone:g} °C/s on" if np.isfinite(gone) else f"to {over[-1]:.1f}°"),
         numbers=numbers,

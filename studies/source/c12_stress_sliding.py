@@ -88,13 +88,10 @@ def work(fast: bool) -> Result:
         "largest_steady_error_deg": error,
         "angle_of_greatest_stress_deg": summit,
     }
-    state = judged(numbers)
-    return Result(
-        holds=state is not State.FAILS,
+    return Result.of(
+        judged(numbers),
         in_part="the overshoot beyond the angle of greatest stress needs gains that are used in this figure alone: with those of M5, M6, M8, C11 and C13 it is "
-        f"{numbers['overshoot_beyond_deg']:.2f}° at most"
-        if state is State.IN_PART
-        else "",
+        f"{numbers['overshoot_beyond_deg']:.2f}° at most",
         found=f"every set point is reached in {reach.min():.1f} to {reach.max():.1f} s; the largest overshoot is "
         f"{largest:.2f}°; with a slacker stress controller ({reach_slack.max():.1f} s at most) the overshoot stays within {loose[~beyond].max():.1f}° up to "
         f"the angle of greatest stress ({summit:.0f}°) and grows beyond it to {loose[-1]:.1f}° at 60°; on the printed filter's stress instead of the true one every set point is "

@@ -48,13 +48,10 @@ def work(fast: bool) -> Result:
         "reach_K_4_s": float(reach[4]),
         "short_at_K_10_deg": -slow,
     }
-    state = judged(numbers)
-    return Result(
-        holds=state is not State.FAILS,
+    return Result.of(
+        judged(numbers),
         in_part=f"near K = 0 the loop keeps swinging and is not unstable: at K = 0 the swing is {early:.1f}° from 4 to 12 s and {swing:.1f}° from 12 to 20 s, no larger than at the start, and "
-        f"at K = {GAINS[1]:g} 1/s the overshoot is {overshoot[1]:.0f}°"
-        if state is State.IN_PART
-        else "",
+        f"at K = {GAINS[1]:g} 1/s the overshoot is {overshoot[1]:.0f}°",
         found=f"overshoot {', '.join(f'{o:.1f}°' for o in overshoot[:4])} at K = {', '.join(f'{k:g}' for k in GAINS[:4])} 1/s, none "
         f"above; K = 0 is marginal: the arm still swings by {swing:.0f}° after 12 s; K = {GAINS[4]:g} takes {reach[4]:.1f} s to come within a "
         f"degree instead of {reach[3]:.1f} s, and K = {GAINS[5]:g} is {-slow:.0f}° short after 20 s",

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
 from smajax.model.rigs import arm
+from smajax.model.system import System
 
 from .regulation import draw_regulation, to_85_degrees
 from .rigs import austenite_range
@@ -31,30 +33,44 @@ def judged(numbers: Mapping[str, float]) -> State:
     return judgement(checked, whole > 0.99)
 
 
+class Passing(NamedTuple):
+    """How the wire passes A_f': the first sample above it (None: no such one), and of each step whether it cools while A_f' falls faster."""
+
+    crossing: int | None
+    cooling: np.ndarray
+    missed: np.ndarray  # those of them inside the range and up to the crossing, in which the law transforms nothing
+
+
+def passing(system: System, stress: np.ndarray, fraction: np.ndarray, temperature: np.ndarray) -> Passing:
+    """Of one run, arrays of shape (time,)."""
+    start, finish = austenite_range(system, stress)
+    beyond = np.flatnonzero((temperature > finish) & (fraction > 1e-3))
+    crossing = int(beyond[0]) if beyond.size else None
+    cooling = (np.diff(temperature) < 0.0) & (np.diff(temperature - finish) > 0.0)
+    missed = cooling & (temperature > start)[1:]
+    missed[crossing or 0 :] = False
+    return Passing(crossing, cooling, missed)
+
+
 def work(fast: bool) -> Result:
     """Sliding control to 85 degrees under each law."""
     loops = to_85_degrees(fast)
     numbers: dict[str, float] = {}
     for law in ("liang", "brinson"):
         run = loops[law].run
-        slope = float(arm(law).wire.kinetics.stress_slope_austenite)
-        start, finish = austenite_range(arm(law), run.stress)
-        beyond = np.flatnonzero((run.temperature > finish) & (run.martensite_fraction > 1e-3))
-        crossing = int(beyond[0]) if beyond.size else 0
-        # What the law misses up to the crossing: inside the range the wire cools while the range falls faster.
-        warmer, nearer = np.diff(run.temperature), np.diff(run.temperature - run.stress / slope)
-        missed = (warmer < 0.0) & (nearer > 0.0) & (run.temperature > start)[1:]
+        finish = austenite_range(arm(law), run.stress)[1]
+        found = passing(arm(law), run.stress, run.martensite_fraction, run.temperature)
+        cooling, missed, crossing = found.cooling, found.missed, found.crossing or 0
+        warmer, nearer = np.diff(run.temperature), np.diff(run.temperature - finish)
         dt = float(run.time[1] - run.time[0])
-        cooling = (warmer < 0.0) & (nearer > 0.0)
         # The stretch begins with the step in which T passes A_f', and lasts to the end of the run.
         stretch = np.arange(len(warmer)) >= crossing - 1
-        missed[crossing:] = False
         numbers |= {
             f"{law}_end_deg": float(np.degrees(run.position[-1])),
             f"{law}_end_fraction": float(run.martensite_fraction[-1]),
             f"{law}_end_temperature_above_finish_C": float(run.temperature[-1] - finish[-1]),
             f"{law}_missed_seconds": float(missed.sum() * dt),
-            f"{law}_crosses_cooling": float(beyond.size > 0 and cooling[crossing - 1]),
+            f"{law}_crosses_cooling": float(found.crossing is not None and cooling[crossing - 1]),
             f"{law}_cooling_seconds_above_finish": float((stretch & cooling).sum() * dt),
             f"{law}_cooling_share_above_finish": float(cooling[stretch].mean()),
             f"{law}_warming_above_finish_C": float(run.temperature[-1] - run.temperature[crossing]),
@@ -62,12 +78,9 @@ def work(fast: bool) -> Result:
             f"{law}_missed_drive_C": float(nearer[missed].sum()),
         }
     tanaka = float(np.degrees(loops["tanaka"].run.position[-1]))
-    state = judged(numbers)
-    return Result(
-        holds=state is not State.FAILS,
-        in_part=f"the wire cools where T passes A_f', as section 3.4 says, but dT/dt < 0 for {numbers['liang_cooling_seconds_above_finish']:.2g} s of the stretch above it alone, after which it heats"
-        if state is State.IN_PART
-        else "",
+    return Result.of(
+        judged(numbers),
+        in_part=f"the wire cools where T passes A_f', as section 3.4 says, but dT/dt < 0 for {numbers['liang_cooling_seconds_above_finish']:.2g} s of the stretch above it alone, after which it heats",
         found=f"the arm stalls at {numbers['liang_end_deg']:.1f}° (Liang) and {numbers['brinson_end_deg']:.1f}° (Brinson) "
         f"with xi = {numbers['liang_end_fraction']:.2f} and T above A_f'; on its way there it cools by "
         f"{-numbers['liang_missed_warming_C']:.2f} °C in moments in which T - sigma/C_A rises by "

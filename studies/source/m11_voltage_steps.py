@@ -76,12 +76,9 @@ def work(fast: bool) -> Result:
         "current_4_V_A": float(current(np.asarray(4.0))),
         "current_16_V_A": float(current(np.asarray(16.0))),
     }
-    state = judged(numbers)
-    return Result(
-        holds=state is not State.FAILS,
-        in_part=f"the transformation goes from 5 to 95 % between {first:.1f} and {last:.1f} V, where the source's goes on up to 16 V"
-        if state is State.IN_PART
-        else "",
+    return Result.of(
+        judged(numbers),
+        in_part=f"the transformation goes from 5 to 95 % between {first:.1f} and {last:.1f} V, where the source's goes on up to 16 V",
         found=f"{millimetres[3]:.2f} mm at 4 V, {millimetres[4]:.1f} mm at 5 V, {millimetres[7]:.1f} mm at 8 V, {millimetres[-1]:.1f} mm at 16 V, higher with every volt; "
         f"5 % is transformed at {first:.1f} V, 95 % at {last:.1f} V; eps_L l_0 = {recovered:.2f} mm, the rest is elastic and thermal; "
         f"at most {rest:.0e} mm from the start after cooling",

@@ -66,12 +66,9 @@ def work(fast: bool) -> Result:
         **{f"net_96 g_{volts:g}_V_mm": float(value) for volts, value in zip(SWEPT, over, strict=True)},
         "fraction_before": float(fraction[0, before]),
     }
-    state = judged(numbers)
-    return Result(
-        holds=state is not State.FAILS,
-        in_part=f"the net shortening for 96 g is {net['96 g']:.2f} mm, where {MEAN:.2f} mm were measured"
-        if state is State.IN_PART
-        else "",
+    return Result.of(
+        judged(numbers),
+        in_part=f"the net shortening for 96 g is {net['96 g']:.2f} mm, where {MEAN:.2f} mm were measured",
         found=f"net shortening at {VOLTS:g} V: {', '.join(f'{value:.2f} mm ({case})' for case, value in net.items())}; measured for 96 g: "
         f"{', '.join(map(str, MEASURED))} mm; Liang's and Brinson's conditions leave {by_law['liang']:.3f} and "
         f"{by_law['brinson']:.3f} mm",

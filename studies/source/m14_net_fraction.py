@@ -57,12 +57,9 @@ def work(fast: bool) -> Result:
         "largest_relative_difference": off,
         "relative_difference_with_elastic_part_16_V": off_whole,
     }
-    state = judged(numbers)
-    return Result(
-        holds=state is not State.FAILS,
-        in_part=f"deflection and fraction agree at every voltage, but at {VOLTS:g} V the fraction changes by {carried[at]:.4f}"
-        if state is State.IN_PART
-        else "",
+    return Result.of(
+        judged(numbers),
+        in_part=f"deflection and fraction agree at every voltage, but at {VOLTS:g} V the fraction changes by {carried[at]:.4f}",
         found=f"0.27/24.75 = {printed:.4f}; simulated at {VOLTS:g} V: {result[at]:.4f} from the deflection, {carried[at]:.4f} carried; at "
         f"{SWEPT[0]:g} to {VOLTS:g} V the two agree within {100 * off:.1f} % where the elastic part of the deflection is taken off",
         numbers=numbers,

@@ -39,6 +39,21 @@ class Result:
     caveat: str = ""  # what else was chosen here or differs, with numbers, and why
     in_part: str = ""
 
+    @classmethod
+    def of(
+        cls,
+        state: State,
+        *,
+        in_part: str,
+        found: str,
+        numbers: dict[str, float],
+        draw: Callable[[Figure], None],
+        caveat: str = "",
+    ) -> Result:
+        """Of a row that is judged by three states; `in_part` is what it says where it holds in part."""
+        reason = in_part if state is State.IN_PART else ""
+        return cls(state is not State.FAILS, found, numbers, draw, caveat, reason)
+
     @property
     def state(self) -> State:
         """The third state is of a claim whose checks pass, though not as the source words it."""

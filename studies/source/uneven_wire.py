@@ -10,7 +10,7 @@ the mass's inertia while pieces lengthen unlike each other.
 from __future__ import annotations
 
 import dataclasses
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -50,9 +50,14 @@ def piece(law: str = "enhanced") -> System:
     return dataclasses.replace(system, effects=(RisingConvection(slope=DEAD_WEIGHT["convection_slope"]),))
 
 
-def kept_heat() -> np.ndarray:
+def kept_heat(unevenness: float = DEAD_WEIGHT["unevenness"]) -> np.ndarray:
     """What each piece keeps of the heat of the mean one, shape (pieces,)."""
-    return np.exp(DEAD_WEIGHT["unevenness"] * norm.ppf((np.arange(PIECES) + 0.5) / PIECES))
+    return np.asarray(np.exp(unevenness * norm.ppf((np.arange(PIECES) + 0.5) / PIECES)))
+
+
+def limited(asked: Any, largest: float) -> Any:
+    """I of I_0, A, by an amplifier with a largest current."""
+    return asked / (1.0 + asked / largest)
 
 
 def current(volts: np.ndarray) -> np.ndarray:
@@ -60,7 +65,7 @@ def current(volts: np.ndarray) -> np.ndarray:
     wire = piece().wire
     cold = float(resistance_per_metre(wire, (), jnp.asarray(20.0), jnp.ones(())) * wire.wire_length)
     asked = DEAD_WEIGHT["amplifier_gain"] * np.asarray(volts) / cold
-    return asked / (1.0 + asked / DEAD_WEIGHT["largest_current"])
+    return np.asarray(limited(asked, DEAD_WEIGHT["largest_current"]))
 
 
 @eqx.filter_jit

@@ -16,13 +16,12 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.stats import norm
 
 from smajax.core.parameters import get_parameters
 from smajax.model.rigs import dead_weight
 from studies.source.m11_voltage_steps import MASS
 from studies.source.m13_mass_removed_and_put_back import MEAN
-from studies.source.uneven_wire import PIECES
+from studies.source.uneven_wire import kept_heat, limited
 from studies.source.unloading import CASES, INITIAL_MASS
 from studies.source.unprinted import DEAD_WEIGHT
 
@@ -35,6 +34,7 @@ NAMES = (
 )  # fmt: skip
 WIRE: dict[str, float] = dict(zip(NAMES, map(float, get_parameters(dead_weight(), list(NAMES))), strict=True))
 AREA, GRAVITY = 0.25 * np.pi * WIRE["wire_diameter"] ** 2, 9.81
+COOLED = WIRE["convection_coefficient"] * np.pi * WIRE["wire_diameter"]  # W/(m K)
 
 
 def _resistance(left: Any) -> Any:
@@ -44,8 +44,7 @@ def _resistance(left: Any) -> Any:
 
 def _loss(over: Any) -> Any:
     """W/m at a temperature above the air's."""
-    surface = WIRE["convection_coefficient"] * np.pi * WIRE["wire_diameter"]
-    return surface * over * (1.0 + DEAD_WEIGHT["convection_slope"] * over)
+    return COOLED * over * (1.0 + DEAD_WEIGHT["convection_slope"] * over)
 
 
 def heated(squared: Any, mass: float) -> tuple[Any, Any]:
@@ -56,10 +55,9 @@ def heated(squared: Any, mass: float) -> tuple[Any, Any]:
     temperature = start + (WIRE["austenite_finish"] - WIRE["austenite_start"]) * way
     # Where R rises faster than the loss a piece goes through at one current.
     needed = np.maximum.accumulate(_loss(temperature - WIRE["ambient_temperature"]) / _resistance(left))
-    kept = np.interp(squared, needed, left)
-    surface = WIRE["convection_coefficient"] * np.pi * WIRE["wire_diameter"]
-    power, slope = squared * _resistance(kept) / surface, DEAD_WEIGHT["convection_slope"]
-    return kept, WIRE["ambient_temperature"] + (np.sqrt(1.0 + 4.0 * slope * power) - 1.0) / (2.0 * slope)
+    left_here = np.interp(squared, needed, left)
+    power, slope = squared * _resistance(left_here) / COOLED, DEAD_WEIGHT["convection_slope"]
+    return left_here, WIRE["ambient_temperature"] + (np.sqrt(1.0 + 4.0 * slope * power) - 1.0) / (2.0 * slope)
 
 
 def _strain(mass: float, left: Any, temperature: Any) -> Any:
@@ -68,10 +66,10 @@ def _strain(mass: float, left: Any, temperature: Any) -> Any:
     return stress / (hot + left * (cold - hot)) + WIRE["recoverable_strain"] * left
 
 
-def net(kept_heat: Any, squared: float, removed: float) -> tuple[float, float]:
+def net(kept: Any, squared: float, removed: float) -> tuple[float, float]:
     """(net shortening in mm, fraction before) at 363 g and I^2 (A^2), a mass taken off and put back."""
-    before, warm = heated(kept_heat * squared, INITIAL_MASS)
-    after = np.minimum(before, heated(kept_heat * squared, INITIAL_MASS - removed)[0])
+    before, warm = heated(kept * squared, INITIAL_MASS)
+    after = np.minimum(before, heated(kept * squared, INITIAL_MASS - removed)[0])
     change = _strain(INITIAL_MASS, before, warm) - _strain(INITIAL_MASS, after, warm)
     return 1e3 * WIRE["wire_length"] * float(change.mean()), float(before.mean())
 
@@ -84,23 +82,23 @@ def amplifier(at_4: float, at_16: float) -> tuple[float, float]:
     return float(asked / 4.0 * _resistance(1.0) * WIRE["wire_length"]), float(asked / share)
 
 
-def left_at(volts: float, kept_heat: Any, gain: float, largest: float) -> tuple[float, float]:
+def left_at(volts: float, kept: Any, gain: float, largest: float) -> tuple[float, float]:
     """(fraction left, temperature of the hottest piece) at 75 g."""
     asked = gain * volts / (_resistance(1.0) * WIRE["wire_length"])
-    left, temperature = heated(kept_heat * (asked / (1.0 + asked / largest)) ** 2, MASS)
+    left, temperature = heated(kept * limited(asked, largest) ** 2, MASS)
     return float(left.mean()), float(temperature.max())
 
 
 def candidates(unevenness: float) -> list[dict[str, float]]:
     """Every amplifier that meets the first two quotes at this unevenness, and what it says of the rest."""
-    kept_heat = np.exp(unevenness * norm.ppf((np.arange(PIECES) + 0.5) / PIECES))
-    at_4 = brentq(lambda one: heated(kept_heat * one, MASS)[0].mean() - LEFT_AT_4_V, 1e-3, 5.0)
+    kept = kept_heat(unevenness)
+    at_4 = brentq(lambda one: heated(kept * one, MASS)[0].mean() - LEFT_AT_4_V, 1e-3, 5.0)
     tried = np.geomspace(1.5 * at_4, 15.9 * at_4, 1200)
-    shortening = np.array([net(kept_heat, one, CASES["96 g"][0]) for one in tried])
+    shortening = np.array([net(kept, one, CASES["96 g"][0]) for one in tried])
     made: list[dict[str, float]] = []
     for at in np.flatnonzero(np.abs(shortening[:, 0] - MEAN) < 0.02 * MEAN):
         gain, largest = amplifier(at_4, tried[at])
-        over = np.array([left_at(volts, kept_heat, gain, largest)[0] for volts in np.arange(1.0, 17.0)])
+        over = np.array([left_at(volts, kept, gain, largest)[0] for volts in np.arange(1.0, 17.0)])
         span = float(np.interp(-0.05, -over, np.arange(1.0, 17.0)) - np.interp(-0.95, -over, np.arange(1.0, 17.0)))
         made.append(
             {
@@ -108,11 +106,8 @@ def candidates(unevenness: float) -> list[dict[str, float]]:
                 "amplifier_gain": gain,
                 "largest_current": largest,
                 "left_before_at_363_g_and_16_V": float(shortening[at, 1]),
-                **{
-                    f"net_{case}_mm": net(kept_heat, tried[at], CASES[case][0])[0]
-                    for case in ("96 g", "192 g", "288 g")
-                },
-                "hottest_C": left_at(16.0, kept_heat, gain, largest)[1],
+                **{f"net_{case}_mm": net(kept, tried[at], CASES[case][0])[0] for case in ("96 g", "192 g", "288 g")},
+                "hottest_C": left_at(16.0, kept, gain, largest)[1],
                 "volts_from_5_to_95_percent": span,
             }
         )

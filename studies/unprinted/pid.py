@@ -22,6 +22,8 @@ from smajax.model.rigs import arm
 from studies.source.c02_pid_at_40 import LONG, PRINTED
 from studies.source.set_points import PERIOD, SECONDS, SET_POINTS
 
+from .candidates import drawn, each
+
 BOX = {"proportional_gain": (3.0, 120.0), "integral_gain": (0.3, 20.0), "derivative_gain": (0.05, 40.0)}
 CANDIDATES, SEED, OWN = 3000, 0, 40.0
 
@@ -31,19 +33,16 @@ def _merits(gains: Any, targets: Any, seconds: float) -> Any:
     system, time = arm(), clock(seconds, PERIOD)
     controller = pid_tuned_at(system, round(OWN))
 
-    def one(row: Any) -> Any:
+    def one(row: Any, target: Any) -> Any:
         tuned = set_vector(controller, tuple(BOX), row)
-        return jax.vmap(
-            lambda target: merit(simulate_closed_loop(system, tuned, constant(time, target), PERIOD, 1), system)
-        )(targets)
+        return merit(simulate_closed_loop(system, tuned, constant(time, target), PERIOD, 1), system)
 
-    return jax.lax.map(one, gains, batch_size=64)
+    return each(one, gains, targets)
 
 
 def found() -> dict[str, Any]:
     """No values: how many candidates fit the tuned set point, and the largest error that one of them leaves both below and above."""
-    low, high = np.log(np.array(list(BOX.values()))).T
-    gains = np.exp(low + (high - low) * np.random.default_rng(SEED).random((CANDIDATES, len(BOX))))
+    gains = drawn(BOX, CANDIDATES, SEED)
     own = jax.tree.map(
         lambda one: np.asarray(one)[:, 0], _merits(jnp.asarray(gains), jnp.radians(jnp.asarray([OWN])), SECONDS)
     )

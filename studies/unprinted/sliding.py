@@ -21,10 +21,12 @@ from smajax.control.presets import printed_filter, stress_sliding
 from smajax.core.parameters import set_vector
 from smajax.model.rigs import arm
 from smajax.model.system import System
-from smajax.model.wire.wire import Kinetics
 from studies.source.c12_stress_sliding import SLACK, TARGETS
 from studies.source.c13_stress_follows import AFTER, TARGET
+from studies.source.m05_old_conditions_stall import passing
 from studies.source.m08_simple_loading import TARGETS as STEPS
+
+from .candidates import each, logarithms
 
 BOX = {
     "surface_slope": (1.5, 25.0),
@@ -45,13 +47,11 @@ def _estimated(system: System, gains: Any, targets: Any) -> Any:
     """The angle of every candidate and target with the printed filter's stress."""
     controller, estimator = stress_sliding(system), printed_filter(system)
 
-    def one(row: Any) -> Any:
+    def one(row: Any, target: Any) -> Any:
         tuned = set_vector(controller, tuple(BOX), row)
-        return jax.vmap(
-            lambda target: simulate_closed_loop(system, tuned, target, DT, 1, estimator=estimator).run.position
-        )(targets)
+        return simulate_closed_loop(system, tuned, target, DT, 1, estimator=estimator).run.position
 
-    return jax.lax.map(one, gains, batch_size=64)
+    return each(one, gains, targets)
 
 
 @eqx.filter_jit
@@ -59,18 +59,14 @@ def _tracked(system: System, gains: Any, targets: Any) -> Any:
     """(angle, stress and stress wanted, voltage, fraction, temperature) of every candidate and target."""
     controller = stress_sliding(system)
 
-    def one(row: Any) -> Any:
+    def one(row: Any, target: Any) -> Any:
         tuned = set_vector(controller, tuple(BOX), row)
+        loop = simulate_closed_loop(system, tuned, target, DT, 1)
+        wanted = jax.vmap(tuned.stress_wanted)(loop.measured, loop.wanted)
+        run = loop.run
+        return run.position, run.stress, wanted, loop.voltage, run.martensite_fraction, run.temperature
 
-        def along(target: Any) -> Any:
-            loop = simulate_closed_loop(system, tuned, target, DT, 1)
-            wanted = jax.vmap(tuned.stress_wanted)(loop.measured, loop.wanted)
-            run = loop.run
-            return run.position, run.stress, wanted, loop.voltage, run.martensite_fraction, run.temperature
-
-        return jax.vmap(along)(targets)
-
-    return jax.lax.map(one, gains, batch_size=64)
+    return each(one, gains, targets)
 
 
 def _run(system: System, gains: Any, targets: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -97,16 +93,6 @@ def _last(error: Rows) -> float:
     return float(_reach(error).max())
 
 
-def cooled(law: Kinetics, stress: Rows, fraction: Rows, temperature: Rows) -> float:
-    """By how much the wire cools until it passes A_f', C, in steps in which the range falls faster than the wire (M5)."""
-    shift = stress / float(law.stress_slope_austenite)
-    beyond = np.flatnonzero((temperature > float(law.austenite_finish) + shift) & (fraction > 1e-3))
-    warmer, nearer = np.diff(temperature), np.diff(temperature - shift)
-    at = (warmer < 0.0) & (nearer > 0.0) & (temperature > float(law.austenite_start) + shift)[1:]
-    at[int(beyond[0]) if beyond.size else 0 :] = False
-    return -float(warmer[at].sum())
-
-
 def missed(gains: np.ndarray) -> list[dict[str, float]]:
     """By how much each candidate misses each sentence; zero where it is met."""
     rows = jnp.asarray(gains)
@@ -120,7 +106,6 @@ def missed(gains: np.ndarray) -> list[dict[str, float]]:
     top = np.full((1, twenty), 85.0)
     reaches = _run(new, rows, top)[0][:, 0]
     stalls, strained, _, _, left, warm = (one[:, 0] for one in _run(old, rows, top))
-    austenite = old.wire.kinetics
     step = np.append(np.repeat(STEPS, round(10.0 / DT)), STEPS[-1])[None]
     tracked, as_old = _run(new, rows, step)[0][:, 0], _run(old, rows, step)[0][:, 0]
     ends = [round(10.0 * (k + 1) / DT) - 1 for k in range(len(STEPS))]
@@ -145,7 +130,8 @@ def missed(gains: np.ndarray) -> list[dict[str, float]]:
                 "C13": 10.0 * (max(0.0, free - 0.1) + max(0.0, moving - 0.2) + max(0.0, late - 0.02)),
                 "M6": max(0.0, float(np.abs(reaches[k, round(15.0 / DT) :] - 85.0).max()) - 0.5),
                 "M5": (0.0 if stalls[k, -1] < 84.0 else 2.0)
-                + 5.0 * max(0.0, 0.2 - cooled(austenite, strained[k], left[k], warm[k])),
+                + 5.0
+                * max(0.0, 0.2 + float(np.diff(warm[k])[passing(old, strained[k], left[k], warm[k]).missed].sum())),
                 "M8": max(0.0, apart - 0.5) + max(0.0, met - 1.0),
             }
         )
@@ -160,7 +146,7 @@ def of_slack_gains() -> dict[str, float]:
 
 def found() -> dict[str, Any]:
     """The best candidate of a covariance-matrix search over all gains."""
-    low, high = np.log(np.array(list(BOX.values()))).T
+    low, high = logarithms(BOX)
     bounds = np.array([[0.0, 1.0]] * len(BOX))
     start = (np.log(START) - low) / (high - low)
     search = CMA(mean=start, sigma=0.25, bounds=bounds, population_size=POPULATION, seed=SEED)

@@ -23,7 +23,10 @@ from smajax.control.controllers.vsc3 import Vsc3
 from smajax.control.figures_of_merit import merit
 from smajax.control.reference import clock, constant
 from smajax.model.rigs import arm
+from studies.source.c04_three_switches import LATE, PRINTED, comes_to_rest
 from studies.source.set_points import PERIOD, SECONDS, SET_POINTS
+
+from .candidates import drawn, each
 
 CANDIDATES, SEED = 360, 0
 BOX = {"surface_slope": (0.9, 2.6), "boundary": (0.05, 0.3), "rate_filter": (0.003, 0.4)}  # 1/s, rad/s, s
@@ -38,14 +41,11 @@ def _regulated(
 ) -> tuple[Any, Any]:
     system, time = arm(), clock(seconds, dt)
 
-    def one(row: Any) -> Any:
-        def at(target: Any) -> Any:
-            loop = simulate_closed_loop(system, make(row), constant(time, target), dt, round(PERIOD / dt))
-            return merit(loop, system), loop.run.position
+    def one(row: Any, target: Any) -> Any:
+        loop = simulate_closed_loop(system, make(row), constant(time, target), dt, round(PERIOD / dt))
+        return merit(loop, system), loop.run.position
 
-        return jax.vmap(at)(targets)
-
-    return jax.lax.map(one, gains, batch_size=32)
+    return each(one, gains, targets, 32)
 
 
 def _surface(row: Any) -> AbstractController:
@@ -58,15 +58,14 @@ def _layer(row: Any) -> AbstractController:
 
 def surface() -> dict[str, Any]:
     """The random candidate that meets every limit of C4 and C5 by most, counted in shares of each limit."""
-    low, high = np.log(np.array(list(BOX.values()))).T
-    drawn = np.exp(low + (high - low) * np.random.default_rng(SEED).random((CANDIDATES, len(BOX))))
+    gains = drawn(BOX, CANDIDATES, SEED)
     one, _ = jax.tree.map(
-        np.asarray, _regulated(_surface, jnp.asarray(drawn), jnp.radians(jnp.asarray(SET_POINTS)), SECONDS, PERIOD)
+        np.asarray, _regulated(_surface, jnp.asarray(gains), jnp.radians(jnp.asarray(SET_POINTS)), SECONDS, PERIOD)
     )
     zero = SET_POINTS.index(0.0)
     shares = np.stack(
         [
-            np.abs(one.settling_time[:, zero] / 3.0 - 1.0) / 0.25,
+            np.abs(one.settling_time[:, zero] / PRINTED["VSC3"] - 1.0) / 0.25,
             np.degrees(one.overshoot[:, zero]) / 0.2,
             np.degrees(one.steady_error[:, zero]) / 0.25,
             one.reach_time.max(axis=1) / 4.0,
@@ -78,7 +77,7 @@ def surface() -> dict[str, Any]:
     worst = np.nan_to_num(shares, nan=99.0, posinf=99.0).max(axis=1)
     best = int(worst.argmin())
     return {
-        "values": {name: float(f"{value:.3g}") for name, value in zip(BOX, drawn[best], strict=True)},
+        "values": {name: float(f"{value:.3g}") for name, value in zip(BOX, gains[best], strict=True)},
         "meet_all": int((worst < 1.0).sum()),
         "tried": CANDIDATES,
         "largest_share_of_a_limit": round(float(worst[best]), 3),
@@ -94,12 +93,11 @@ def layer() -> dict[str, Any]:
         _, position = _regulated(_layer, jnp.asarray(grid), jnp.zeros(1), SECONDS, dt)
         angle = np.degrees(np.asarray(position)[:, 0])
         time = dt * np.arange(angle.shape[1])
-        off = np.abs(angle - angle[:, time > 0.8 * SECONDS].mean(axis=1, keepdims=True)) > 1.0
-        rests.append(np.array([time[np.flatnonzero(one)[-1]] if one.any() else 0.0 for one in off]))
-        late = angle[:, time > 8.5]
+        rests.append(np.array([comes_to_rest(time, one) for one in angle]))
+        late = angle[:, time > LATE]
         stands.append(np.ptp(np.diff(late, axis=1) / dt, axis=1) < AT_REST)
     agree = (np.abs(rests[0] - rests[1]) < 0.05) & stands[0] & stands[1]
-    best = min(np.flatnonzero(agree), key=lambda k: abs(rests[1][k] - 8.0))
+    best = min(np.flatnonzero(agree), key=lambda k: abs(rests[1][k] - PRINTED["VSC2"]))
     width, edge = grid[best]
     return {
         "values": {"boundary": width, "layer_gain": round(-edge / width, 1)},
