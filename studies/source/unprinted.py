@@ -37,10 +37,13 @@ SURFACE = {
     "boundary": 0.0671,  # rad/s
     "rate_filter": 0.0875,  # s
 }
-# C4: VSC2, with u = K s inside its layer as eq. 4.5 prints it.
+HIGH_VOLTAGE = 10.0  # V, sec. 4.4.4
+# C4: VSC2, with u = K s inside its layer as eq. 4.5 prints it. Nothing of it is chosen for C4: the layer is VSC3's, which at rest
+# is phi / lambda of the angle, and K is what meets V_high at its edge, s = -phi.
+LAYER_WIDTH = SURFACE["boundary"] / SURFACE["surface_slope"]
 LAYER = {
-    "boundary": 0.03,  # rad
-    "layer_gain": -333.3,  # V/rad: V_high where s = -phi
+    "boundary": LAYER_WIDTH,  # rad
+    "layer_gain": -HIGH_VOLTAGE / LAYER_WIDTH,  # V/rad
 }
 # C15 to C22; C16, C17 and C22 sweep one of the two.
 BACKSTEPPING = {

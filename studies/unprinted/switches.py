@@ -1,4 +1,4 @@
-"""VSC3's slope, layer and velocity filter, one set for C4, C5 and C7; and VSC2's layer as eq. 4.5 prints it (C4).
+"""VSC3's slope, layer and velocity filter, one set for C4, C5 and C7; and VSC2 with the same layer (C4).
 
 The text: VSC3 takes 3 s to 0 degrees without overshoot and with a greatly reduced steady error, and is "fast and accurate regardless of
 the desired angular position" (sec. 4.4.4); its velocity is a "numerical derivative approximation ... obtained by filtering out the noise".
@@ -7,6 +7,7 @@ VSC2 has no chatter, overshoots and settles in 8 s.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import Any
 
@@ -25,6 +26,7 @@ from smajax.control.reference import clock, constant
 from smajax.model.rigs import arm
 from studies.source.c04_three_switches import LATE, PRINTED, comes_to_rest
 from studies.source.set_points import PERIOD, SECONDS, SET_POINTS
+from studies.source.unprinted import HIGH_VOLTAGE, LAYER
 
 from .candidates import drawn, each
 
@@ -56,8 +58,9 @@ def _layer(row: Any) -> AbstractController:
     return Vsc2(10.0, 4.0, row[0], AsPrinted(-row[1] / row[0]))
 
 
-def surface() -> dict[str, Any]:
-    """The random candidate that meets every limit of C4 and C5 by most, counted in shares of each limit."""
+@functools.cache
+def _candidates() -> tuple[np.ndarray, np.ndarray]:
+    """(random candidates, the largest share of a limit of C4 and C5 that each has)."""
     gains = drawn(BOX, CANDIDATES, SEED)
     one, _ = jax.tree.map(
         np.asarray, _regulated(_surface, jnp.asarray(gains), jnp.radians(jnp.asarray(SET_POINTS)), SECONDS, PERIOD)
@@ -74,7 +77,12 @@ def surface() -> dict[str, Any]:
         ],
         axis=1,
     )
-    worst = np.nan_to_num(shares, nan=99.0, posinf=99.0).max(axis=1)
+    return gains, np.nan_to_num(shares, nan=99.0, posinf=99.0).max(axis=1)
+
+
+def surface() -> dict[str, Any]:
+    """The random candidate that meets every limit of C4 and C5 by most, counted in shares of each limit."""
+    gains, worst = _candidates()
     best = int(worst.argmin())
     return {
         "values": {name: float(f"{value:.3g}") for name, value in zip(BOX, gains[best], strict=True)},
@@ -85,8 +93,15 @@ def surface() -> dict[str, Any]:
 
 
 def layer() -> dict[str, Any]:
-    """The layer that rests nearest to 8 s, of those that two step sizes agree on and that stand still from 8.5 s on."""
-    grid = [(width, edge) for width in LAYERS for edge in EDGES]
+    """VSC2 with the layer of VSC3's surface and V_high at its edge, and what other layers do.
+
+    Others: those of all candidates of `surface` that meet every limit, and a grid, of which those count that two step sizes agree on and that
+    stand still from 8.5 s on.
+    """
+    gains, worst = _candidates()
+    others = sorted(row[1] / row[0] for row in gains[worst < 1.0])
+    own = [(LAYER["boundary"], HIGH_VOLTAGE)]
+    grid = own + [(width, HIGH_VOLTAGE) for width in others] + [(width, edge) for width in LAYERS for edge in EDGES]
     rests: list[Any] = []
     stands: list[Any] = []
     for dt in (PERIOD, PERIOD / 2):
@@ -97,12 +112,19 @@ def layer() -> dict[str, Any]:
         late = angle[:, time > LATE]
         stands.append(np.ptp(np.diff(late, axis=1) / dt, axis=1) < AT_REST)
     agree = (np.abs(rests[0] - rests[1]) < 0.05) & stands[0] & stands[1]
-    best = min(np.flatnonzero(agree), key=lambda k: abs(rests[1][k] - PRINTED["VSC2"]))
-    width, edge = grid[best]
+    theirs, anywhere = slice(1, 1 + len(others)), slice(1 + len(others), None)
+    near = np.abs(rests[1] / PRINTED["VSC2"] - 1.0) < 0.25
     return {
-        "values": {"boundary": width, "layer_gain": round(-edge / width, 1)},
-        "comes_to_rest_s": round(float(rests[1][best]), 3),
-        "rest_after_s": [round(float(np.min(rests)), 2), round(float(np.max(rests)), 2)],
-        "agree_and_stand_still": int(agree.sum()),
-        "tried": len(grid),
+        "values": dict(LAYER),
+        "comes_to_rest_s": [round(float(rest[0]), 3) for rest in rests],
+        "stands_still": bool(agree[0]),
+        "layers_of_other_surfaces_rad": [round(float(others[0]), 4), round(float(others[-1]), 4)],
+        "of_these": len(others),
+        "rest_after_s": [round(float(rests[1][theirs].min()), 2), round(float(rests[1][theirs].max()), 2)],
+        "near_8_s": int(near[theirs].sum()),
+        "other_layers": {
+            "tried": len(LAYERS) * len(EDGES),
+            "agree_and_stand_still": int(agree[anywhere].sum()),
+            "rest_after_s": [round(float(np.min(rests[1][anywhere])), 2), round(float(np.max(rests[1][anywhere])), 2)],
+        },
     }
