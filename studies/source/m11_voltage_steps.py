@@ -14,7 +14,7 @@ from smajax.report.drawing import BLUE, keyed, named, panels
 
 from .rigs import simulated
 from .row import Result, Row, State, judgement
-from .uneven_wire import PIECES, current, hung, piece
+from .uneven_wire import CUT, PIECES, current, hung, piece
 from .unprinted import DEAD_WEIGHT
 
 VOLTS = np.arange(1.0, 17.0)
@@ -84,9 +84,9 @@ def work(fast: bool) -> Result:
         f"at most {rest:.0e} mm from the start after cooling",
         numbers=numbers,
         draw=draw,
-        caveat="amplifier, heat loss and evenness of the temperature are not printed; one set for M11 to M14, from what is quoted of them (studies/unprinted): gain "
+        caveat="amplifier, heat loss and evenness of the temperature are not printed; one set for M11 to M14, three values that meet three numbers which are quoted of them, within two limits of ours (studies/unprinted): gain "
         f"{DEAD_WEIGHT['amplifier_gain']:g}, largest current {DEAD_WEIGHT['largest_current']:g} A ({numbers['current_4_V_A']:.2f} A at 4 V, {numbers['current_16_V_A']:.2f} A at 16 V), "
-        f"the heat that {PIECES} pieces keep spread by {100 * DEAD_WEIGHT['unevenness']:.0f} %. The hottest piece comes to {numbers['hottest_piece_C']:.0f} °C. With one temperature along "
+        f"the heat that a piece of the wire keeps spread by {100 * DEAD_WEIGHT['unevenness']:.0f} % (a normal distribution, cut at {CUT:g} of its standard deviations; {PIECES} pieces). The hottest piece comes to {numbers['hottest_piece_C']:.0f} °C. With one temperature along "
         "the wire, power as V² and a constant h_c the rise is complete a volt after its onset. The integrated form of the constitutive law is used: under the rate "
         f"form a cycle of an even wire ends {open_cycle:.1f} mm off its start.",
     )

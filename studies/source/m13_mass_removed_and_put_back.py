@@ -74,8 +74,8 @@ def work(fast: bool) -> Result:
         f"{by_law['brinson']:.3f} mm",
         numbers=numbers,
         draw=draw,
-        caveat="amplifier, heat loss and evenness of the temperature are those of M11, M12 and M14, one set, found with eq. 3.16 among what is quoted (studies/unprinted): the size for 96 g "
-        "is fitted, the sizes for 192 and 288 g (not printed), the signs and the old laws' zeros are not. "
+        caveat="amplifier, heat loss and evenness of the temperature are those of M11, M12 and M14, one set of three values for three quoted numbers, of which two are of eq. 3.16 (studies/unprinted): the size for 96 g "
+        "and the fraction before the change are fitted, the sizes for 192 and 288 g (not printed), the signs and the old laws' zeros are not. "
         f"By voltage: {', '.join(f'{abs(value):.2f} mm at {volts:g} V' for volts, value in zip(SWEPT, over, strict=True))}. {100 * numbers['fraction_before']:.1f} % martensite are left before the change; "
         "with one temperature along the wire 16 V leave none, and no net shortening.",
     )

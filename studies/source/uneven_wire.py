@@ -1,10 +1,14 @@
 """The dead weight's wire in pieces which the air cools unevenly: one stress and one current, each at its own temperature.
 
 Section 3.5.1 names a "nonuniform temperature distribution" and prints none. Here the heat that a piece keeps, the inverse of
-its h_c, is spread as a logarithmic normal distribution of standard deviation `unevenness`; the amplifier gives
+its h_c, is spread as what many small causes make of it, a normal distribution of mean 1 and standard deviation `unevenness`;
+it ends at `CUT` standard deviations, so that a wire in more pieces has no hotter one. The amplifier gives
 I = I_0/(1 + I_0/I_max), I_0 = g V/(R_M l_0), and h rises with temperature as of a thin wire in free convection
 (`RisingConvection`). The wire is as long as the mean of its pieces. Neglected: conduction from piece to piece, and
 the mass's inertia while pieces lengthen unlike each other.
+
+A piece transforms within a few per cent of the heat that it keeps. The pieces are therefore one ratio apart in it, a fraction of
+that range, each with the share of the wire that lies around it.
 """
 
 from __future__ import annotations
@@ -13,13 +17,13 @@ import dataclasses
 from typing import Any, NamedTuple
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 from scipy.stats import norm
 
 from smajax.core.parameters import set_vector
+from smajax.engine import program
 from smajax.model.drive.current import Current
 from smajax.model.effects.rising_convection import RisingConvection
 from smajax.model.rigs import dead_weight
@@ -31,17 +35,26 @@ from smajax.simulation.simulate import simulate
 
 from .unprinted import DEAD_WEIGHT
 
-PIECES = 96
+COOLING = "convection_coefficient"  # in which the pieces differ
+PIECES = 768
+CUT = 2.5  # standard deviations: 98.8 % of the normal distribution
 Lanes = Float[np.ndarray, "lanes time"]
 
 
 class Hung(NamedTuple):
-    """What the pieces do together, arrays of shape (lanes, time)."""
+    """What the pieces do together, arrays of shape (lanes, time) but for the temperature."""
 
     rise: np.ndarray  # of the mass, m
     fraction: np.ndarray  # martensite, -
-    hottest: np.ndarray  # temperature of the hottest piece, C
+    hottest: np.ndarray  # greatest temperature of the hottest piece, C, shape (lanes,)
     compliance: np.ndarray  # mean of 1/E over the pieces, 1/Pa
+
+
+class Pieces(NamedTuple):
+    """The wire, arrays of shape (pieces,)."""
+
+    kept: np.ndarray  # of the heat that the mean piece keeps, -
+    shares: np.ndarray  # of the wire's length, -
 
 
 def piece(law: str = "enhanced") -> System:
@@ -50,9 +63,12 @@ def piece(law: str = "enhanced") -> System:
     return dataclasses.replace(system, effects=(RisingConvection(slope=DEAD_WEIGHT["convection_slope"]),))
 
 
-def kept_heat(unevenness: float = DEAD_WEIGHT["unevenness"]) -> np.ndarray:
-    """What each piece keeps of the heat of the mean one, shape (pieces,)."""
-    return np.asarray(np.exp(unevenness * norm.ppf((np.arange(PIECES) + 0.5) / PIECES)))
+def kept_heat(unevenness: float = DEAD_WEIGHT["unevenness"], pieces: int = PIECES, cut: float = CUT) -> Pieces:
+    """What each piece keeps of the heat of the mean one, and how much of the wire does so."""
+    kept = np.geomspace(1.0 - cut * unevenness, 1.0 + cut * unevenness, pieces)
+    shares = norm.pdf((kept - 1.0) / unevenness) * kept
+    shares[[0, -1]] *= 0.5  # the trapezoidal rule in the logarithm of the kept heat
+    return Pieces(kept, shares / shares.sum())
 
 
 def limited(asked: Any, largest: float) -> Any:
@@ -68,27 +84,28 @@ def current(volts: np.ndarray) -> np.ndarray:
     return np.asarray(limited(asked, DEAD_WEIGHT["largest_current"]))
 
 
-@eqx.filter_jit
-def _hung(
-    system: System, convections: Float[Array, " pieces"], current: Series, mass: Series, dt: float
-) -> tuple[Series, ...]:
-    def of(convection: Scalar) -> tuple[Series, ...]:
-        whole = set_vector(system, ["convection_coefficient"], convection[None])
-        run = simulate(whole, {"current": current, "mass": mass}, dt)
-        compliance = 1.0 / young_modulus(system.wire, run.martensite_fraction)
-        return run.position, run.martensite_fraction, run.temperature, compliance
-
-    position, fraction, temperature, compliance = jax.vmap(of)(convections)
-    return position.mean(axis=0), fraction.mean(axis=0), temperature.max(axis=0), compliance.mean(axis=0)
+class _Lane(eqx.Module):
+    system: System
+    current: Series
+    mass: Series
+    dt: Scalar
 
 
-def hung(volts: Lanes, mass: Lanes, dt: float, law: str = "enhanced") -> Hung:
+def _piece(lane: _Lane, own: dict[str, Scalar]) -> tuple[Series, Series, Scalar, Series]:
+    system = set_vector(lane.system, [COOLING], own[COOLING][None])
+    run = simulate(system, {"current": lane.current, "mass": lane.mass}, lane.dt)
+    compliance = 1.0 / young_modulus(system.wire, run.martensite_fraction)
+    return run.position, run.martensite_fraction, run.temperature.max(), compliance
+
+
+def hung(volts: Lanes, mass: Lanes, dt: float, law: str = "enhanced", pieces: int = PIECES) -> Hung:
     """The mass (kg) on the wire under a command (V), one lane after the other; `dt` in s."""
     system = piece(law)
-    convections = jnp.asarray(float(system.wire.heat.convection_coefficient) / kept_heat())
-    # Lane by lane: one program for any number of them.
-    lanes = [
-        _hung(system, convections, jnp.asarray(amperes), jnp.asarray(masses), dt)
-        for amperes, masses in zip(current(np.asarray(volts)), np.asarray(mass), strict=True)
-    ]
-    return Hung(*(np.stack([np.asarray(one) for one in ones]) for ones in zip(*lanes, strict=True)))
+    kept, shares = kept_heat(pieces=pieces)
+    own = {COOLING: float(system.wire.heat.convection_coefficient) / kept}
+    lanes = []
+    for amperes, masses in zip(current(np.asarray(volts)), np.asarray(mass), strict=True):
+        lane = _Lane(system, jnp.asarray(amperes), jnp.asarray(masses), jnp.asarray(dt))
+        position, fraction, hottest, compliance = program(_piece, lane, (COOLING,))(lane, own)
+        lanes.append((shares @ position, shares @ fraction, hottest.max(), shares @ compliance))
+    return Hung(*(np.stack(ones) for ones in zip(*lanes, strict=True)))

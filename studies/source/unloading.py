@@ -25,7 +25,8 @@ PERIODS = 6  # of HELD seconds, enough for three steps down and three up; shorte
 Lane = tuple[str, float]  # (a key of CASES, volts)
 
 
-def _mass(case: str, first: int, held: int) -> np.ndarray:
+def mass_over_time(case: str, first: int, held: int) -> np.ndarray:
+    """kg at each sample: `first` samples of the full mass, then `held` of each step."""
     removed, steps = CASES[case]
     down = [INITIAL_MASS - removed * (k + 1) / steps for k in range(steps)]
     levels = [*down, *down[-2::-1]]
@@ -38,7 +39,7 @@ def unloaded(law: str, fast: bool, *lanes: Lane) -> tuple[Hung, int, np.ndarray,
     """(runs, sample just before the first change, masses, time), arrays of shape (lanes, time)."""
     dt = 0.1 if fast else 0.02
     first, held = round(HEATED / dt), round(HELD / dt)
-    mass = np.stack([_mass(case, first, held) for case, _ in lanes])
+    mass = np.stack([mass_over_time(case, first, held) for case, _ in lanes])
     volts = np.array([volts for _, volts in lanes])[:, None] * np.ones(mass.shape[1])
     return hung(volts, mass, dt, law), first - 1, mass, dt * np.arange(mass.shape[1])
 
@@ -49,4 +50,14 @@ def net_deflection(rise: np.ndarray, before: int) -> np.ndarray:
     return net
 
 
-__all__ = ["CASES", "EVEN_VOLTS", "INITIAL_MASS", "LAWS", "SWEPT", "VOLTS", "net_deflection", "unloaded"]
+__all__ = [
+    "CASES",
+    "EVEN_VOLTS",
+    "INITIAL_MASS",
+    "LAWS",
+    "SWEPT",
+    "VOLTS",
+    "mass_over_time",
+    "net_deflection",
+    "unloaded",
+]

@@ -17,9 +17,9 @@ from smajax.model.system import System
 
 # M11 to M14: amplifier, its largest current, heat loss and unevenness of the dead weight's wire (`uneven_wire`).
 DEAD_WEIGHT = {
-    "amplifier_gain": 1.515,  # -
-    "largest_current": 1.137,  # A
-    "unevenness": 0.40,  # -, standard deviation of ln of the heat that a piece keeps
+    "amplifier_gain": 1.792,  # -
+    "largest_current": 1.145,  # A
+    "unevenness": 0.35,  # -, standard deviation of the heat that a piece keeps, of its mean
     "convection_slope": 2e-3,  # 1/K, of h_c: h ~ (T - T_inf)^0.2, free convection of a thin wire; not fitted
 }
 # M5, M6, M8 and C11 to C13.
