@@ -65,7 +65,7 @@ def work(fast: bool) -> Result:
         + (f"to less than {GONE}° from {gone:g} °C/s on" if np.isfinite(gone) else f"to {over[-1]:.1f}°"),
         numbers=numbers,
         draw=lambda figure: _draw(figure, runs, over, list(over_damped.values())),
-        caveat=f"the controller gets the true state. Without temperature control (K_p = 0) the overshoot is "
+        caveat=f"the gains of C8 and C9, quicker than those of C4, with which VSC overshoots by less than a degree (C8); the controller gets the true state. Without temperature control (K_p = 0) the overshoot is "
         f"{', '.join(f'{over_damped[band]:.1f}' for band in SHOWN)}° at {', '.join(f'{band:g}' for band in SHOWN)} °C/s, for inside the band the command falls with the "
         f"speed, whatever the temperature. From 100 °C/s on A_f' changes by {quickest:.0f} °C/s at most: a band beyond that does not switch; the preset's is "
         f"{float(preset.temperature_band):g} °C/s (by search). What the temperature term adds is an earlier arrival, at {BANDS[-1]:g} °C/s after "

@@ -75,7 +75,7 @@ def work(fast: bool) -> Result:
         draw=draw,
         caveat="gains of both by search, the source prints none; the sliding controller's are those of M5, M6, M8, C12 and C13, one set for all (studies/unprinted). The PID is the one of Fig. 4.3, "
         f"without anti-windup, which the source does not name: one with it, tuned at four set points, misses by {worst_best:.1f}° at most, so that the contrast is windup more than the "
-        "want of a linear controller. The sliding controller gets the true stress.",
+        "want of a linear controller. Both command 10 V at most, as every controller here (sec. 4.4.4). The sliding controller gets the true stress.",
     )
 
 

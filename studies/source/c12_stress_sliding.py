@@ -27,6 +27,7 @@ SLACK = {
     "boundary": 1.7,  # rad/s
     "stress_gain": 2e-7,  # V/Pa
     "stress_integral_gain": 1e-6,  # V/(Pa s)
+    "stress_derivative_gain": 0.0,  # V s/Pa
 }
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from smajax.control.controllers.inverse_wire import strain_at_angle
-from smajax.control.presets import backstepping_two, printed_filter
+from smajax.control.presets import printed_filter
 from smajax.core.parameters import set_parameters
 from smajax.model.rigs import arm
 from smajax.model.system import System
@@ -19,9 +19,10 @@ from smajax.report.drawing import BLACK, BLUE, GREY, RED, keyed, named, panels
 from .backstepping_runs import ON_ITS_PLANT, SECONDS, degrees, plant, runs
 from .rigs import Recorded, austenite_range, martensite_range
 from .row import Result, Row
-from .unprinted import BACKSTEPPING, backstepping
+from .unprinted import BACKSTEPPING, backstepping, backstepping_searched
 
 SHOWN = 40.0  # degrees
+LATE = 10.0  # s: the arm has settled
 FILTERED, NOISE = 20.0, 1e-3  # degrees, rad: the runs on estimated states
 
 
@@ -50,18 +51,18 @@ def _draw(figure: Figure, system: System, loops: Recorded, shown: int, tight: in
 
 
 def judged(numbers: Mapping[str, float]) -> bool:
-    """Settles after an overshoot at every set point, and the voltage falls."""
+    """Settles after an overshoot at every set point; the voltage falls at the top of it, and is less from there on than before."""
     checked = max(numbers["largest_settling_s"], numbers["settling_s"]) < SECONDS
     checked &= numbers["least_overshoot_deg"] > 1.0 and numbers["overshoot_deg"] > 5.0
     checked &= numbers["voltage_at_top_V"] < 0.2 * numbers["first_voltage_V"]
-    checked &= numbers["holding_voltage_V"] < numbers["first_voltage_V"]
+    checked &= numbers["late_mean_voltage_V"] < numbers["mean_voltage_to_the_top_V"]
     return checked
 
 
 def work(fast: bool) -> Result:
     """On the section's plant, with the gains of C16 to C21 and those searched for settling; then on the plant of chapter 3."""
     system = plant()
-    usual, tight = backstepping(system), backstepping_two(system)
+    usual, tight = backstepping(system), backstepping_searched(system)
     lanes = [(usual, -20.0), (usual, 0.0), (usual, SHOWN), (tight, SHOWN)]
     loops, merits = runs([system] * len(lanes), [one for one, _ in lanes], [at for _, at in lanes], fast)
     rate_form = arm()
@@ -83,7 +84,11 @@ def work(fast: bool) -> Result:
     overshoot, settling = np.degrees(merits.overshoot), merits.settling_time
     shown, searched = 2, 3
     top = int(angle[shown].argmax())
-    first, after, last = float(volts[shown][:top].max()), float(volts[shown][top]), float(volts[shown][-2])
+    first, after, heating = (
+        float(one) for one in (volts[shown][:top].max(), volts[shown][top], volts[shown][:top].mean())
+    )
+    # The last sample's command is not applied.
+    late = volts[shown][:-1][time[:-1] >= LATE]
     elsewhere = degrees(other)[:, time > 16.0]
 
     numbers = {
@@ -95,7 +100,10 @@ def work(fast: bool) -> Result:
         "overshoot_searched_deg": float(overshoot[searched]),
         "first_voltage_V": first,
         "voltage_at_top_V": after,
-        "holding_voltage_V": last,
+        "mean_voltage_to_the_top_V": heating,
+        "late_mean_voltage_V": float(late.mean()),
+        "late_least_voltage_V": float(late.min()),
+        "late_largest_voltage_V": float(late.max()),
         "settling_filter_s": float(min(seen.settling_time[0], 2.0 * SECONDS)),
         "steady_error_filter_deg": float(error[0]),
         "overshoot_filter_deg": float(over[0]),
@@ -112,7 +120,8 @@ def work(fast: bool) -> Result:
         holds=judged(numbers),
         found=f"the arm settles at {SHOWN:.0f}° within {settling[shown]:.1f} s after an overshoot of {overshoot[shown]:.1f}° "
         f"(at -20° and 0° after {overshoot[0]:.1f}° and {overshoot[1]:.1f}°); the voltage falls from "
-        f"{first:.1f} V at first to {after:.1f} V at the top of the overshoot, and holds the arm with {last:.1f} V",
+        f"{first:.1f} V at first to {after:.1f} V at the top of the overshoot, from {heating:.1f} V on average up to there to {late.mean():.1f} V after {LATE:g} s; the arm rests then, but the voltage does not: "
+        f"it goes between {late.min():.1f} and {late.max():.1f} V, as the wire is taken from its curve of heating to that of cooling and back",
         numbers=numbers,
         draw=partial(_draw, system=system, loops=loops, shown=shown, tight=searched),
         caveat=f"{ON_ITS_PLANT}. On the states of the printed filter, with exact readings, the arm {settles[0]} at {FILTERED:.0f}° with {over[0]:.1f}° of overshoot "

@@ -143,6 +143,7 @@ CASES: dict[str, list[tuple[Numbers, State]]] = {
         ({"least_overshoot_deg": 0.9}, FAILS),
         ({"overshoot_deg": 4.9}, FAILS),
         ({"voltage_at_top_V": 3.0}, FAILS),
+        ({"late_mean_voltage_V": 8.0}, FAILS),
         ({"largest_settling_s": 40.0}, FAILS),
     ],
     "C16": [
@@ -161,6 +162,13 @@ CASES: dict[str, list[tuple[Numbers, State]]] = {
         ({"settling_shift_by_10_percent_of_inertia_s": 1.3}, FAILS),
         ({"overshoot_shift_by_10_percent_of_inertia_deg": 1.1}, FAILS),
         ({"settling_0.5_I_s": 40.0}, FAILS),
+    ],
+    "C20": [
+        ({"end_0.95_hc_deg": 15.5}, FAILS),
+        ({"end_1.05_hc_deg": 24.5}, FAILS),
+        ({"end_1_hc_deg": 20.6}, FAILS),
+        ({"end_1.1_hc_deg": 50.0}, FAILS),
+        ({"hottest_above_start_1.1_hc_C": 5.6}, FAILS),
     ],
 }
 KEPT_IN_PART = {"M5", "M12", "C2", "C9", "C10", "C12", "C16"}
