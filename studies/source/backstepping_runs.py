@@ -35,7 +35,7 @@ Tree = TypeVar("Tree")
 PERIOD, SECONDS = 0.01, 20.0
 ON_ITS_PLANT = (
     "plant: the integrated law without a thermal term, which is what the section prints (eq. 4.51) and the controller "
-    "inverts; on that of the other rows it does not settle (C15). The controller gets the true state and commands 10 V at most, as every controller here"
+    "inverts; on that of the other rows approach II does not settle (C15). The controller gets the true state and commands 10 V at most, as every controller here"
 )
 
 
