@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+import scipy  # its parts are imported when they are first used
 
 from smajax.attribution.joint_parameters import JointParameters, residual_and_columns
 from smajax.core.whiteness import correlation_time, on_samples, split_runs
@@ -53,7 +53,7 @@ class FittedModel:
         value += 0.5 * float(np.log(self.precision).sum() - np.log(eigenvalues).sum()) + float(np.log(size).sum())
         if self.one_sided:
             deviation = size * np.sqrt((vectors**2 / eigenvalues).sum(axis=1))
-            value += sum(float(np.log(2.0) + stats.norm.logcdf(at / deviation[k])) for k, at in self.one_sided)
+            value += sum(float(np.log(2.0) + scipy.stats.norm.logcdf(at / deviation[k])) for k, at in self.one_sided)
         return value
 
     def covariance(self, variance: float) -> np.ndarray:

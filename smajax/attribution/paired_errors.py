@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
-from scipy import stats
+import scipy  # its parts are imported when they are first used
 
 from smajax.attribution.config import AttributionConfig
 from smajax.attribution.findings import RunFinding
@@ -66,14 +66,14 @@ def pooled_rms(runs: Sequence[np.ndarray]) -> float:
 
 def _by_chance(scores: Sequence[np.ndarray], errors: float) -> float:
     """What the sum of the scores (n,) of runs may be off by: so many standard errors, were it normal."""
-    quantile = stats.norm.cdf(errors)
+    quantile = scipy.stats.norm.cdf(errors)
     count, time = sum(map(len, scores)), correlation_time(scores)
-    within = np.sqrt(_squares(scores) * time) * stats.t.ppf(quantile, max(count / time - 1.0, 1.0))
+    within = np.sqrt(_squares(scores) * time) * scipy.stats.t.ppf(quantile, max(count / time - 1.0, 1.0))
     if len(scores) == 1:
         return float(within)
     sums = np.asarray([float(score.sum()) for score in scores])
     between = np.sqrt(len(sums) / (len(sums) - 1) * float(sums @ sums))
-    return float(max(within, between * stats.t.ppf(quantile, max(len(sums) - 1.0, LEAST_FREEDOM))))
+    return float(max(within, between * scipy.stats.t.ppf(quantile, max(len(sums) - 1.0, LEAST_FREEDOM))))
 
 
 def _squares(runs: Sequence[np.ndarray]) -> float:

@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import optimize, stats
+import scipy  # its parts are imported when they are first used
 
 from smajax.attribution.every_effect import EVERY
 from smajax.core.whiteness import correlation_time, split_runs
@@ -58,7 +58,7 @@ def score_of(
     if seen.any():
         room = (high - low)[seen]
         lower, upper = np.minimum(low[seen] / room, 0.0), np.maximum(high[seen] / room, 0.0)
-        solved = optimize.lsq_linear(boxed[:, seen], residual, bounds=(lower - 1e-12, upper + 1e-12))
+        solved = scipy.optimize.lsq_linear(boxed[:, seen], residual, bounds=(lower - 1e-12, upper + 1e-12))
         found[seen] = solved.x * room
     before = float(residual @ residual)
     after = residual - columns @ found
@@ -67,7 +67,7 @@ def score_of(
     return Score(
         names,
         gain,
-        float(stats.chi2.sf(statistic, max(1, int(seen.sum())))),
+        float(scipy.stats.chi2.sf(statistic, max(1, int(seen.sum())))),
         dict(zip(coefficients, found.tolist(), strict=True)),
     )
 

@@ -16,7 +16,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy import linalg, stats
+import scipy  # its parts are imported when they are first used
 
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.traces import Traces, Variant
@@ -64,7 +64,7 @@ class LinearModel:
             factor = np.linalg.cholesky(self.gram[np.ix_(columns, columns)] + np.diag(self.precision[columns]))
         except np.linalg.LinAlgError:
             return -np.inf
-        inverse = linalg.solve_triangular(factor, np.eye(len(columns)), lower=True)
+        inverse = scipy.linalg.solve_triangular(factor, np.eye(len(columns)), lower=True)
         half = inverse @ self.right[columns]
         value = 0.5 * float(half @ half) - float(np.log(np.diag(factor)).sum())
         value += 0.5 * float(np.log(self.precision[columns]).sum()) + sum(self.log_odds[one] for one in subset)
@@ -74,14 +74,14 @@ class LinearModel:
             ratio = (mean / deviation)[sided]
             if (ratio < -IMPOSSIBLE).any():
                 return -np.inf
-            value += float(np.sum(np.log(2.0) + stats.norm.logcdf(ratio)))
+            value += float(np.sum(np.log(2.0) + scipy.stats.norm.logcdf(ratio)))
         return value
 
     def estimate(self, subset: Subset) -> Estimate:
         """Posterior mean of all parameters of a model with `subset`."""
         columns = self._columns(subset)
         matrix = self.gram[np.ix_(columns, columns)] + np.diag(self.precision[columns])
-        mean = linalg.solve(matrix, self.right[columns], assume_a="pos") * self.scales[columns]
+        mean = scipy.linalg.solve(matrix, self.right[columns], assume_a="pos") * self.scales[columns]
         values = {self.names[column]: float(one) for column, one in zip(columns, mean, strict=True)}
         own = set(self.unknowns)
         return Estimate(

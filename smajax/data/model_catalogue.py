@@ -70,8 +70,12 @@ def _scale(system: System) -> Scale:
     cooling = heat.convection_coefficient * jnp.pi * wire.wire_diameter
 
     def warming(inputs: Mapping[str, np.ndarray]) -> np.ndarray:
-        given = {name: jnp.asarray(values) for name, values in inputs.items()}
-        return np.asarray(heating_power(system, resistance, given) / cooling, dtype=np.float64)
+        count = max(map(len, inputs.values()), default=0)
+        # Of a length that many logs share: JAX compiles each of its operations for each.
+        more = (1 << max(count - 1, 0).bit_length()) - count
+        given = {name: jnp.asarray(np.pad(values, (0, more), mode="edge")) for name, values in inputs.items()}
+        found = np.asarray(heating_power(system, resistance, given) / cooling, dtype=np.float64)
+        return found[:count] if found.ndim else found
 
     return Scale(
         float(wire.wire_length),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import prod
-from typing import Any, cast
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -87,13 +87,12 @@ def _any_unknown(given: Sequence[Value]) -> bool:
 
 def _number(text: Text, value: Value) -> Lane | None:
     """The lane of a number in registers, or of one that is known; None of anything else."""
-    kind = type(value)
-    if kind is not Held and kind is not np.ndarray:
-        return None
-    one = cast(np.ndarray, value)
-    if one.shape != ():
-        return None
-    return cast(Lane, one.item()) if kind is Held else text.constant(one[()], name_of(one.dtype))
+    # Asked for every argument of every operation: without a call that can be spared.
+    if type(value) is Held:
+        return value.item() if value.shape == () else None
+    if type(value) is np.ndarray and value.shape == ():
+        return text.constant(value[()], name_of(value.dtype))
+    return None
 
 
 class _Translation:
@@ -191,9 +190,14 @@ class _Translation:
 
         if out.shape == ():
             # Nearly all there is: without the ways of arrays.
-            numbers = [_number(self.text, one) for one in given]
-            if None not in numbers:
-                return held(put(*cast(list[Lane], numbers)))
+            numbers = []
+            for one in given:
+                number = _number(self.text, one)
+                if number is None:
+                    break
+                numbers.append(number)
+            else:
+                return held(put(*numbers))
         size = prod(out.shape)
         if size > SMALL:
             if all(isinstance(one, Filled) or (is_known(one) and size_of(one) == 1) for one in given):

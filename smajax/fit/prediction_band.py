@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy import stats
+import scipy  # its parts are imported when they are first used
 
 from smajax.fit.predicted import predicted_and_derivatives
 from smajax.fit.problem import Problem
 
 BAND = 0.9  # share of the measured samples that are expected in the band
-NORMAL = float(stats.norm.ppf(0.5 + 0.5 * BAND))  # standard deviations on either side that have that share
+NORMAL = float(scipy.special.ndtri(0.5 + 0.5 * BAND))  # standard deviations on either side that have that share
 
 
 class Reading(NamedTuple):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from scipy.sparse.csgraph import connected_components
+import scipy  # its parts are imported when they are first used
 
 from smajax.core.correlation import correlation_of
 from smajax.core.whiteness import WHITE, bartlett_sum, correlation_time, split_runs, whiteness_p_value
@@ -155,7 +155,9 @@ def clusters(covariance: np.ndarray) -> list[list[int]]:
     """
     if not len(covariance):
         return []
-    count, of = connected_components(np.abs(correlation_of(covariance)) > CORRELATED, directed=False)
+    count, of = scipy.sparse.csgraph.connected_components(
+        np.abs(correlation_of(covariance)) > CORRELATED, directed=False
+    )
     clusters = [np.flatnonzero(of == cluster).tolist() for cluster in range(count)]
     return [cluster for cluster in clusters if len(cluster) > 1]
 

@@ -9,7 +9,25 @@ Numbers first, words last: `narrative` turns findings into sentences, `pictures`
 Public: `Findings`, `Narrative`, `narrate`, `write_report`.
 """
 
-from smajax.attribution.findings import Findings as Findings
-from smajax.report.narrative import Narrative as Narrative
-from smajax.report.narrative import narrate as narrate
-from smajax.report.write import write_report as write_report
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from smajax.attribution.findings import Findings as Findings
+    from smajax.report.narrative import Narrative as Narrative
+    from smajax.report.narrative import narrate as narrate
+    from smajax.report.write import write_report as write_report
+
+# Imported when they are asked for: a command that writes no report needs no plotting library for a table.
+_WHERE = {
+    "Findings": "smajax.attribution.findings",
+    "Narrative": "smajax.report.narrative",
+    "narrate": "smajax.report.narrative",
+    "write_report": "smajax.report.write",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _WHERE:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_WHERE[name]), name)

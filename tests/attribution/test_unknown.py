@@ -130,9 +130,9 @@ def test_the_spline_equals_de_boors() -> None:
 def test_unknown_terms_at_zero_are_the_base_model() -> None:
     search, values, found = _screened()
     assert {term.effect_name for term in found.terms} == set(UNKNOWN)
-    alone, _ = _setting()
+    alone, fitted = _setting()
     (with_all,) = predicted_at(search.problem, [values])
-    (without,) = predicted_at(alone.problem, [_setting()[1].values])
+    (without,) = predicted_at(alone.problem, [fitted.values])
     np.testing.assert_allclose(with_all, without, rtol=0.0, atol=1e-11)
 
 

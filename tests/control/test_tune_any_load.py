@@ -58,6 +58,7 @@ PLANTS = {
 }
 
 
+@pytest.mark.slow  # on the arm in `test_tuning_folder`
 def test_tuning_pid_on_a_dead_weight_lowers_its_cost(tmp_path: Path) -> None:
     """From gains that settle late; what is written is what was found, in V/m, and reads back onto the plant."""
     slow = {"proportional_gain": 250.0, "integral_gain": 300.0, "derivative_gain": 60.0, "unwinding_time": 1.0}

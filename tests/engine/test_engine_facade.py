@@ -161,7 +161,8 @@ def test_xla_gives_the_same_numbers_when_machine_code_fails(
 
 
 @pytest.mark.usefixtures("forgetful")
-@pytest.mark.parametrize("run", often(RUNS, ["a coupon"]))
+@pytest.mark.slow  # of a coupon in `test_engine_cache`
+@pytest.mark.parametrize("run", RUNS)
 def test_a_corrupt_cache_entry_is_compiled_again(run: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """No warning, the same numbers, and a sound entry afterwards."""
     expected = right(run)

@@ -35,7 +35,8 @@ def _chosen(problem: Problem) -> Problem:
     return with_integration(problem, choose_integration(problem, problem.system))
 
 
-@pytest.mark.parametrize("name", study.RIGS)
+# The other rigs at 250 ms are in `test_integration_error`.
+@pytest.mark.parametrize("name", often(study.RIGS, ["arm", "dead weight"]))
 def test_a_log_of_100_ms_is_integrated_to_a_tenth_of_the_noise(name: str) -> None:
     """Against the event-aware integration by scipy; one step a sample leaves several times as much."""
     problem = _problem(name, 0.1)

@@ -78,6 +78,7 @@ def test_a_run_of_the_same_wire_is_predicted_to_its_noise_and_nine_of_ten_sample
     assert "0.96 times the noise of 0.1 mm; 92% of the samples lie in the 90 % band" in conclusions(result)[0]
 
 
+@pytest.mark.slow  # twelve wires; of one run above
 def test_the_band_holds_wires_that_differ_as_the_parameters_errors_say(tmp_path: Path) -> None:
     model = kept_model()
     inside = []

@@ -57,9 +57,8 @@ def _same(system: System, inputs: dict[str, jax.Array]) -> None:
         np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-9 * float(np.abs(other).max()), err_msg=name)
 
 
-@pytest.mark.parametrize(
-    "law", [law if law == "enhanced" else pytest.param(law, marks=pytest.mark.slow) for law in LAWS]
-)
+@pytest.mark.slow  # the enhanced law's arm is in `test_engine`
+@pytest.mark.parametrize("law", LAWS)
 def test_every_law_equals_xla(law):
     system, channel, top = RIGS["arm"]
     _same(dataclasses.replace(system, wire=under_law(system.wire, law)), _inputs(channel, top))

@@ -48,7 +48,8 @@ def _share(found: xr.Dataset, rig: study.Rig, exact: np.ndarray) -> float:
     return float(np.sqrt(np.mean((difference - difference[0]) ** 2))) / whole_transformation(rig.system)["reading"]
 
 
-@pytest.mark.parametrize("name", study.RIGS)
+# The other rigs at 100 ms are in `test_integration`.
+@pytest.mark.parametrize("name", often(study.RIGS, ["coupon", "bias spring"]))
 def test_a_run_is_right_at_a_coarse_clock(name: str) -> None:
     """Against the event-aware integration by scipy; one step a sample leaves more."""
     rig = study.RIGS[name]()

@@ -115,6 +115,7 @@ def test_slopes_have_the_unit_of_the_measure_over_that_of_the_parameter() -> Non
     assert convert(1.0, units["mean_temperature_by_convection_coefficient"], "K m^2 K/mW") == pytest.approx(1e-3)
 
 
+@pytest.mark.slow  # measures are in `test_batch`
 def test_slopes_are_streamed_to_disk_and_resumed(tmp_path: Path) -> None:
     axes = sampled(40, voltage=(5.5, 8.5), seed=2)
     here = run_batch(ARM, {}, axes, **WARMTH)

@@ -19,8 +19,7 @@ has no linear programming, so both halves would only wrap `linprog`.
 from __future__ import annotations
 
 import numpy as np
-from scipy import sparse
-from scipy.optimize import linprog
+import scipy  # its parts are imported when they are first used
 
 from smajax.control.tune.evaluate import Evaluation
 from smajax.control.tune.objective import SPREAD, Goal
@@ -67,7 +66,7 @@ def step(
     weights, pieces = goal.weight_vector[used], np.flatnonzero(counted)
     # Unknowns: d (gains), t, v, q (loops that count x terms used).
     worst, lines = goal.objective == "worst", len(pieces) * len(used)
-    cost = np.zeros(gains + 2 + lines)
+    sparse, cost = scipy.sparse, np.zeros(gains + 2 + lines)
     cost[gains], cost[gains + 1] = float(worst), PENALTY
     if not worst:
         shares = _shares(goal, terms @ goal.weight_vector, counted)[pieces]
@@ -95,7 +94,9 @@ def step(
         least.append(1.0 - terms[:, k] / bound)
     box = [(max(-radius, -here), min(radius, 1.0 - here)) for here in centre]
     ends = [*box, (None, None) if worst else (0.0, 0.0), (0.0, None), *[(0.0, None)] * lines]
-    solution = linprog(cost, A_ub=sparse.vstack(rows, format="csr"), b_ub=np.concatenate(least), bounds=ends)
+    solution = scipy.optimize.linprog(
+        cost, A_ub=sparse.vstack(rows, format="csr"), b_ub=np.concatenate(least), bounds=ends
+    )
     if solution.x is None:  # a matrix that the solver rejects: no reduction is predicted
         return centre, np.inf
     return np.clip(centre + solution.x[:gains], 0.0, 1.0), float(solution.fun)

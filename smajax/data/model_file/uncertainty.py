@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from io import BytesIO
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from smajax.data.experiment.record import Prior
 from smajax.data.model_file.edits import as_written
 from smajax.data.model_file.record import LikelyModel, ModelRecord
 from smajax.data.model_file.schema import FORMAT
+
+if TYPE_CHECKING:
+    import xarray as xr  # in half a second, where a file is written or read
 
 ERRORS = (
     "A value that each run has its own of is the mean over the fit runs; its variance is what these values scatter by, and it is taken as "
@@ -21,6 +23,8 @@ ERRORS = (
 
 def uncertainty_of(model: ModelRecord) -> xr.Dataset:
     """What is known of the fitted values of each likely model: `value_0`, `covariance_0`, ... along `parameter_0`."""
+    import xarray as xr
+
     result = xr.Dataset(attrs={"title": model.title, "format": FORMAT, "unit": "SI, degC, rad", "errors": ERRORS})
     # Of a model that was read and is saved again: what was changed by hand in between stays said.
     result.attrs["written"] = model.as_fitted or as_written(model)
@@ -32,6 +36,8 @@ def uncertainty_of(model: ModelRecord) -> xr.Dataset:
 
 
 def _dataset(one: LikelyModel, number: str) -> xr.Dataset:
+    import xarray as xr
+
     every, known = f"parameter_{number}", f"determined_{number}"
     names = list(one.values)
     priors = [one.priors.get(name) for name in names]
@@ -59,6 +65,8 @@ class Uncertainty(NamedTuple):
 
 def read_uncertainty(content: bytes) -> Uncertainty:
     """Raises ValueError for what `uncertainty_of` did not write."""
+    import xarray as xr
+
     try:
         with xr.open_dataset(BytesIO(content), engine="scipy") as dataset:
             dataset.load()
