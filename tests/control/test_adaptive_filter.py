@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -173,7 +174,7 @@ def test_a_branch_that_is_lost_lays_the_curves_through_the_state(lost: bool, amp
     vector = jnp.asarray([0.5, 0.0, 65.0, 0.28])
     resting = with_vector(ARM, at_rest, vector)
     no = jnp.zeros((), bool)
-    found = FILTER.filter.consistent(ARM, resting, vector.at[3].set(0.30), no, jnp.asarray(lost))
+    found = eqx.filter_jit(FILTER.filter.consistent)(ARM, resting, vector.at[3].set(0.30), no, jnp.asarray(lost))
     assert float(found.wire.xi_M) == pytest.approx(amplitude, abs=1e-6)
 
 

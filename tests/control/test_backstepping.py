@@ -105,7 +105,7 @@ def test_the_stress_error_dies_out_at_its_gain_in_the_limit_of_a_small_step() ->
     loops = batch(lanes, [20.0] * 6, STEPS * 2, [(-10.0, 0.0)] * 3 + [(0.0, 0.0)] * 3)
     assert (loops.voltage[:, :-1] > 0.1).all()
     assert (loops.voltage < float(ONE.largest_voltage)).all()
-    wanted = jax.vmap(jax.vmap(ONE.stress_wanted))(loops.run.position, loops.run.velocity, loops.wanted)
+    wanted = jax.jit(jax.vmap(jax.vmap(ONE.stress_wanted)))(loops.run.position, loops.run.velocity, loops.wanted)
     z = loops.run.stress - np.asarray(wanted)
     off = [abs(z[k, round(0.1 / step)] / z[k, 0] - math.exp(-0.1 * gain)) for k, step in enumerate(STEPS * 2)]
     for first in (0, 3):
@@ -151,18 +151,20 @@ def test_the_inverse_wire_gives_the_fraction_and_temperature_of_the_plant() -> N
     """Along a run, angle and stress give the fraction (eq. 4.72), and that the temperature (eq. 4.73, 4.74)."""
     loops = batch([TWO] * 6, [40.0, 60.0, 20.0, -20.0, 0.0, 10.0], [0.01] * 6, [(0.0, 0.0)] * 6)
     run = loops.run
-    fraction = np.asarray(jax.vmap(jax.vmap(lambda at, s: fraction_for(PLANT, at, s)))(run.position, run.stress))
+    fraction = np.asarray(
+        jax.jit(jax.vmap(jax.vmap(lambda at, s: fraction_for(PLANT, at, s))))(run.position, run.stress)
+    )
     np.testing.assert_allclose(fraction, run.martensite_fraction, atol=1e-6)
-    strain = np.asarray(jax.vmap(jax.vmap(lambda at: strain_at_angle(PLANT, at)))(run.position))
+    strain = np.asarray(jax.jit(jax.vmap(jax.vmap(lambda at: strain_at_angle(PLANT, at))))(run.position))
     law = PLANT.wire.constitutive
     modulus = law.young_modulus_austenite + fraction * (law.young_modulus_martensite - law.young_modulus_austenite)
     np.testing.assert_allclose(modulus * (strain - law.recoverable_strain * fraction), run.stress, rtol=1e-6)
     heating = np.diff(run.martensite_fraction, axis=1, append=1.0) < -1e-5
     heating &= np.diff(run.martensite_fraction, axis=1, prepend=1.0) < -1e-5
     assert heating.sum() > 200
-    back = jax.vmap(lambda xi, s, m, a: temperature_for(LAW, xi, s, jnp.asarray(True), m, a, jnp.asarray(1e-9)))(
-        fraction[heating], run.stress[heating], run.xi_M[heating], run.xi_A[heating]
-    )
+    back = jax.jit(
+        jax.vmap(lambda xi, s, m, a: temperature_for(LAW, xi, s, jnp.asarray(True), m, a, jnp.asarray(1e-9)))
+    )(fraction[heating], run.stress[heating], run.xi_M[heating], run.xi_A[heating])
     np.testing.assert_allclose(np.asarray(back), run.temperature[heating], atol=1e-4)
 
 
@@ -198,7 +200,7 @@ def test_the_temperature_of_a_fraction_inverts_the_kinetics(
 def test_the_slope_of_arccos_is_bounded_as_stated() -> None:
     edge = jnp.asarray(1e-6)
     at = jnp.array([-2.0, -1.0, -1.0 + 1e-9, 0.3, 1.0 - 1e-9, 1.0, 2.0])
-    slope = jax.vmap(jax.grad(bounded_arccos), (0, None))(at, edge)
+    slope = jax.jit(jax.vmap(jax.grad(bounded_arccos), (0, None)))(at, edge)
     assert (jnp.abs(slope) <= 1.0 / jnp.sqrt(2.0 * edge - edge**2) * (1.0 + 1e-9)).all()
     assert (slope[1:6] < 0.0).all(), "no dead end inside of [-1, 1]"
     assert abs(float(bounded_arccos(jnp.asarray(0.3), edge)) - math.acos(0.3)) < 1e-12

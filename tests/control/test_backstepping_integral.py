@@ -123,7 +123,7 @@ def test_the_motion_asked_for_is_stable_where_routh_says_so_and_then_has_a_lyapu
         force = force_per_stress(believed) * stress - equation.resistance(position, rate)
         return jnp.stack([weight * off + damping * rate, rate, force / equation.inertia()])
 
-    matrix = np.asarray(jax.jacfwd(rates)(jnp.zeros(3)))
+    matrix = np.asarray(jax.jit(jax.jacfwd(rates))(jnp.zeros(3)))
     stable = bool(np.linalg.eigvals(matrix).real.max() < 0.0)
     assert stable == (damping * time + damping**2 / weight > 1.0)
     function = solve_continuous_lyapunov(matrix.T, -np.eye(3))

@@ -17,7 +17,7 @@ from scipy.stats import chi2
 
 from smajax.control.closed_loop import simulate_closed_loop
 from smajax.control.estimators.believed_state import advanced, vector_of, with_correction, with_vector
-from smajax.control.estimators.kalman import AbstractPrediction, Belief, Linearised, corrected
+from smajax.control.estimators.kalman import AbstractPrediction, Belief, Innovation, Linearised, corrected
 from smajax.control.estimators.printed_filter import PastCarried, PastDropped
 from smajax.control.estimators.run import estimate
 from smajax.control.estimators.unscented import Unscented
@@ -67,9 +67,14 @@ def test_on_a_linear_system_both_filters_equal_the_kalman_filter(prediction: Abs
     rng = np.random.default_rng(3)
     mean, covariance = np.array([0.2, -0.1, 0.4]), np.diag([1.0, 0.5, 2.0])
     belief = Belief(jnp.asarray(mean), jnp.asarray(covariance))
-    for reading in rng.standard_normal(60):
+
+    @jax.jit
+    def after(belief: Belief, reading: jax.Array) -> tuple[Belief, Innovation]:
         belief, _ = prediction.predicted(lambda x: (jnp.asarray(LINEAR) @ x, None), belief, jnp.asarray(Q))
-        belief, innovation = corrected(belief, jnp.asarray(reading), jnp.asarray(SEEN), jnp.asarray(R))
+        return corrected(belief, reading, jnp.asarray(SEEN), jnp.asarray(R))
+
+    for reading in rng.standard_normal(60):
+        belief, innovation = after(belief, jnp.asarray(reading))
         mean, covariance = LINEAR @ mean, LINEAR @ covariance @ LINEAR.T + Q
         variance = SEEN @ covariance @ SEEN + R
         gain, off = covariance @ SEEN / variance, reading - SEEN @ mean

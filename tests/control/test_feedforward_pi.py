@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -47,10 +48,15 @@ def held(system: System, shares: list[float], seconds: float) -> list[float]:
     """Where the plant is, as a share of its stroke, after the command of each position was held for so long, open loop."""
     loop = hysteresis_of(system)
     turns, commands = no_turns(jnp.asarray(system.load.start(), dtype=float)), []
-    for share in shares:
-        position = jnp.asarray(at_share(system, share))
+
+    @jax.jit
+    def led(turns: Turns, position: jax.Array) -> tuple[Turns, jax.Array]:
         turns = turned(loop, turns, position)
-        commands.append(float(leading_command(loop, turns, position, jnp.zeros(()))))
+        return turns, leading_command(loop, turns, position, jnp.zeros(()))
+
+    for share in shares:
+        turns, command = led(turns, jnp.asarray(at_share(system, share)))
+        commands.append(float(command))
     count = round(seconds / DT)
     voltage = np.append(np.repeat(commands, count), commands[-1])
     run = sma.simulate_compiled(system, {"voltage": jnp.asarray(voltage)}, dt=DT)
