@@ -17,13 +17,14 @@ from smajax.attribution.model_fits import Model, Search
 from smajax.core.result_cache import ResultCache
 from smajax.fit.packed_runs import RunBatch
 from smajax.fit.prediction_band import BAND
-from tests.helpers.hot_weight import CANDIDATES, NOISE, UNKNOWNS, hot_weight
+from tests.helpers.hot_weight import NOISE, UNKNOWNS, hot_weight
 
+CANDIDATES = ("latent_heat", "sensor_gain")  # what the rival is made of
 TRUTH = {"latent_heat.enthalpy": 1.2e4}
 
 
 def _fitted() -> tuple[Search, JointSearch, Model]:
-    search = hot_weight(TRUTH)
+    search = hot_weight(TRUTH, CANDIDATES)
     problem = search.joint.problem
     found = search_jointly(search, {(): problem.start_values()})
     setting = Search(problem, UNKNOWNS, search.joint.bounds, CANDIDATES, ResultCache())
@@ -37,7 +38,7 @@ def fitted() -> tuple[Search, JointSearch, Model]:
 
 def _fresh_runs() -> RunBatch:
     """The same bench with another noise."""
-    return hot_weight(TRUTH, seed=77).joint.problem.batch
+    return hot_weight(TRUTH, CANDIDATES, seed=77).joint.problem.batch
 
 
 @pytest.mark.slow

@@ -97,7 +97,7 @@ def test_a_sensor_that_shows_the_whole_motion_is_given_no_limit() -> None:
     assert np.mean(reading > search.extent.highest - 0.1 * search.extent.stroke) > 0.1
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", often([1, 2, 3], [1]))
 def test_without_a_missing_effect_none_is_named(seed: int) -> None:
     search = hot_weight({}, seed=seed)
     model = search_jointly(search, {(): search.joint.problem.start_values()})

@@ -128,7 +128,7 @@ def test_a_model_that_lacks_nothing_has_one_column(findings):
 @pytest.mark.usefixtures("drawn")
 def test_a_diverged_model_is_still_drawn(findings):
     run = dataclasses.replace(findings.runs[0], before=np.full(1200, NAN), rmse_before=NAN)
-    broken = dataclasses.replace(findings, runs=(run, *findings.runs[2:]))
+    broken = dataclasses.replace(findings, runs=(run,))
     assert all(image.std() > 10.0 for image in Page(findings_to_html(broken)).images())
 
 
