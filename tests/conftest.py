@@ -127,7 +127,7 @@ def blank_pictures(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr("smajax.report.series_picture.as_picture", lambda *_, **__: picture.getvalue())
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def browser() -> Iterator[Any]:
     """A headless Chromium with an empty profile, which each page of its own context has too; skips where there is none."""
     playwright = pytest.importorskip(
