@@ -74,8 +74,9 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     prepare()
     OPTIMISED_LEVELS.update({name: kernel.COMPILE_OPTIONS[name] for name in UNOPTIMISED_LEVELS})
     kernel.COMPILE_OPTIONS.update(UNOPTIMISED_LEVELS)
-    # Tracing makes millions of small objects that live: the collector looked at them again and again, a tenth of the time.
-    gc.set_threshold(100_000, 20, 50)
+    # Tracing makes millions of small objects that live: the collector looked at them again and again, a tenth of the time. Now it
+    # looks at new ones alone; to look at all those that lived once took seconds each time.
+    gc.set_threshold(100_000, 500, 50)
 
 
 @pytest.fixture(scope="module")
