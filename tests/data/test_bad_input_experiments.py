@@ -23,7 +23,7 @@ from smajax.simulation.sensors import sensor_output, sensors_of
 from tests.helpers.small_bench import bench, log, refused, smajax, table
 
 PARAMETERS = "[model.parameters]\n{}\n[unknown]"
-REFUSED = {
+REFUSED: dict[str, tuple[tuple[str, str], str]] = {
     "M_f above M_s": (
         ("[unknown]", PARAMETERS.format('martensite_finish = "60 degC"')),
         "model.parameters.martensite_finish: `martensite_finish` = 60 degC is not below `martensite_start`",
