@@ -9,11 +9,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from smajax.control.closed_loop import simulate_closed_loop
 from smajax.control.controllers.base import AbstractController
 from smajax.control.controllers.preset import EQUATION, STATE, ControllerPreset
 from smajax.control.measured_state import MeasuredState
 from smajax.control.presets import CONTROLLERS
-from smajax.control.reference import Reference
+from smajax.control.reference import Reference, clock, constant
 from smajax.control.tune.evaluate import TuningProblem
 from smajax.control.tune.scenarios import tuned_on
 from smajax.core.parameters import parameter, set_parameters
@@ -22,6 +23,7 @@ from smajax.model.types import Scalar
 
 HOLDS = "backstepping1_integral"  # knows the plant and the true state: here it only holds
 SIDE, ZOOMS = 17, 5
+PERIOD = 0.005  # s
 SHORTEST = 0.01  # s, of a pause
 
 
@@ -82,3 +84,13 @@ def switching_times(
         low, high = np.clip(best[1] - width, 0.0, 1.0), np.clip(best[1] + width, 0.0, 1.0)
     gains = problem.gains(best[1])
     return best[0], gains["full_until"], gains["pause"]
+
+
+def switched_voltage(
+    system: System, degrees: float, full_voltage: float, full_until: float, pause: float, seconds: float
+) -> np.ndarray:
+    """The command of a pair of times, V, sample by sample."""
+    times = {"full_until": full_until, "pause": pause}
+    controller = set_parameters(bang(system, full_voltage), times)
+    wanted = constant(clock(seconds, PERIOD), np.radians(degrees))
+    return np.asarray(simulate_closed_loop(system, controller, wanted, PERIOD, 1).voltage)

@@ -14,7 +14,8 @@ from smajax.core.files import json_text, replace
 from smajax.core.runtime import prepare
 from smajax.model.rigs import arm
 from smajax.model.system import System
-from studies.time_optimal.bang import switching_times
+from studies.time_optimal.bang import switched_voltage, switching_times
+from studies.time_optimal.direct import PIECE, settled_directly
 
 HERE = Path(__file__).parent
 SET_POINTS = (-40.0, -10.0, 20.0, 50.0, 85.0)  # degrees
@@ -24,15 +25,21 @@ SECONDS = 6.0
 MARK = "<!-- table -->"
 
 
-def switched(system: System, degrees: tuple[float, ...], limit: float) -> list[dict[str, Any]]:
-    """Of each set point: the least time to reach it, and the least to settle by switching, s; None: unreachable."""
+def settled(system: System, degrees: tuple[float, ...], limit: float) -> list[dict[str, Any]]:
+    """Of each set point: the least time to reach it, and what switching and then direct optimisation settle in, s; None: unreachable."""
     reach = least_reach_times(system, np.radians(degrees), limit)
     rows: list[dict[str, Any]] = []
     for angle, least in zip(degrees, reach, strict=True):
         row: dict[str, Any] = {"set_point_deg": angle, "limit_V": limit, "reach_s": None}
         if np.isfinite(least):
-            settled, full, pause = switching_times(system, angle, limit, float(least), SECONDS)
-            row |= {"reach_s": float(least), "settle_by_switching_s": settled, "full_until_s": full, "pause_s": pause}
+            known, full, pause = switching_times(system, angle, limit, float(least), SECONDS)
+            row |= {"reach_s": float(least), "settle_by_switching_s": known, "full_until_s": full, "pause_s": pause}
+            if np.isfinite(known):
+                start = switched_voltage(system, angle, limit, full, pause, SECONDS)
+                directly, shares = settled_directly(system, angle, limit, float(least), known, start)
+                voltages = [round(float(limit * share), 3) for share in shares]
+                if np.isfinite(directly):
+                    row |= {"settle_directly_s": directly, "samples_a_voltage": PIECE, "voltages": voltages}
         rows.append(row)
     return rows
 
@@ -40,8 +47,8 @@ def switched(system: System, degrees: tuple[float, ...], limit: float) -> list[d
 def table(rows: list[dict[str, Any]]) -> str:
     """A row a set point and limit."""
     lines = [
-        "| set point, ° | limit, V | there, s | settled, by switching, s | full voltage until, s | none for, s |",
-        "|---|---|---|---|---|---|",
+        "| set point, ° | limit, V | there, s | settled, directly, s | settled, by switching, s | full voltage until, s | none for, s |",
+        "|---|---|---|---|---|---|---|",
     ]
 
     def shown(row: dict[str, Any], name: str) -> str:
@@ -51,7 +58,7 @@ def table(rows: list[dict[str, Any]]) -> str:
 
     for row in rows:
         there = "unreachable" if row["reach_s"] is None else shown(row, "reach_s")
-        names = ("settle_by_switching_s", "full_until_s", "pause_s")
+        names = ("settle_directly_s", "settle_by_switching_s", "full_until_s", "pause_s")
         cells = [f"{row['set_point_deg']:g}", f"{row['limit_V']:g}", there, *(shown(row, name) for name in names)]
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
@@ -61,7 +68,7 @@ def main(arguments: list[str]) -> None:
     """All limits; the results stay beside the script."""
     prepare(cores=True)
     limits = LIMITS[:1] if "--fast" in arguments else LIMITS
-    rows = [row for limit in limits for row in switched(arm(), (*SET_POINTS, *SWUNG_TO), limit)]
+    rows = [row for limit in limits for row in settled(arm(), (*SET_POINTS, *SWUNG_TO), limit)]
     _write(rows)
 
 
