@@ -40,6 +40,9 @@ ALLOWED_EXCESS = (
     (8, 200.0),
     (14, 100.0),
 )  # after so many steps fits end whose cost is so far above the least
+# Far behind by what is still to come: 15 nats, which no smaller number of parameters makes up for.
+HOPELESS_EXCESS = (4, 30.0)
+ONE_OF_EACH = 4  # steps, after which of the fits of one set from two places the better one alone goes on
 SETTLED = 0.05  # relative change of the error of a sample
 DETECTABLE = 1.0  # standard errors that an effect of one width has to change the runs by to be looked for
 CERTAIN = 100.0  # nats that the linear model loses without an effect, beyond which no refit makes up for it
@@ -111,7 +114,7 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
             search.fitted[effects] = fitted_model(search.joint, effects, starts[effects], carried)
     error = min(search.error(model) for model in search.fitted.values())
     # All to their end, however far behind: the base model is what every result is held against.
-    _fit_side_by_side(search, list(starts.items()), error, "fitting what the search begins with", ())
+    _fit_side_by_side(search, list(starts.items()), error, "fitting what the search begins with", compared=False)
     present = search.best(error)
     error = search.error(present)
     checked: set[tuple[str, ...]] = set()  # models whose effects were removed and replaced one by one
@@ -207,10 +210,14 @@ def _promising(search: JointSearch, linear: LinearModel, present: FittedModel, e
         effects = _effects(search, subset)
         if linear.log_evidence(subset) < least or len(sets) == FITTED:
             break
-        fresh = abs(np.log(search.trials.get(effects, np.inf) / error)) > 2.0 * SETTLED
-        if effects != present.effects and fresh:
+        if effects != present.effects and _fresh(search, effects, error):
             sets.setdefault(effects, subset)
     return list(sets.values())
+
+
+def _fresh(search: JointSearch, effects: tuple[str, ...], error: float) -> bool:
+    """Whether a set was not yet fitted at about this error of a sample."""
+    return abs(np.log(search.trials.get(effects, np.inf) / error)) > 2.0 * SETTLED
 
 
 def _neighbours(search: JointSearch, linear: LinearModel, present: FittedModel, error: float) -> list[Subset]:
@@ -229,6 +236,7 @@ def _neighbours(search: JointSearch, linear: LinearModel, present: FittedModel, 
         near += [here - {gone}, *likeliest(here - {gone})[:REPLACED]]
     near = [one for one in near if linear.log_evidence(one) > linear.log_evidence(here) - CERTAIN]
     near = sorted(near, key=lambda one: -linear.log_evidence(one))[:NEIGHBOURS]
+    near = [one for one in near if _fresh(search, _effects(search, one), error)]
     if error < UNEXPLAINED * search.noise:
         return near
     beside: dict[tuple[str, ...], Subset] = {}
@@ -264,24 +272,32 @@ def _fit_side_by_side(
     begun: Sequence[tuple[tuple[str, ...], np.ndarray]],
     error: float,
     stage: str,
-    allowed_excess: tuple[tuple[int, float], ...] = ALLOWED_EXCESS,
+    compared: bool = True,
 ) -> None:
-    """Fit sets of effects from values (P,), those of one program side by side; the likelier of two fits of one set counts."""
+    """Fit sets of effects from values (P,), those of one program side by side; the better of two fits of one set counts.
+
+    `compared`: those that fall far behind end early.
+    """
     joint = search.joint
     search.settings.progress(Stage(stage, 0.0))
-    settings = dataclasses.replace(comparison_settings(search.settings, stage), allowed_excess=allowed_excess)
+    settings = comparison_settings(search.settings, stage)
+    if not compared:
+        settings = dataclasses.replace(settings, allowed_excess=(), hopeless_excess=None)
     groups = [
         (carried, [one for one in begun if one[0] in members])
         for carried, members in _grouped(search, [effects for effects, _ in begun])
     ]
-    for effects, carried, values, cost in fits_by_program(joint, groups, error, settings):
-        search.trials[effects] = error
-        if np.isfinite(cost):
-            # Coefficients of other effects count for nothing in this model.
-            model = fitted_model(joint, effects, joint.without(values, effects), carried)
-            old = search.fitted.get(effects)
-            if old is None or model.log_evidence(error**2) > old.log_evidence(error**2):
-                search.fitted[effects] = model
+    least: dict[tuple[str, ...], EndedFit] = {}
+    for fit in fits_by_program(joint, groups, error, settings):
+        search.trials[fit.effects] = error
+        if np.isfinite(fit.cost) and (fit.effects not in least or fit.cost < least[fit.effects].cost):
+            least[fit.effects] = fit
+    for effects, fit in least.items():
+        # Coefficients of other effects count for nothing in this model.
+        model = fitted_model(joint, effects, joint.without(fit.values, effects), fit.carried)
+        old = search.fitted.get(effects)
+        if old is None or model.log_evidence(error**2) > old.log_evidence(error**2):
+            search.fitted[effects] = model
 
 
 class EndedFit(NamedTuple):
@@ -336,6 +352,8 @@ def comparison_settings(settings: FitSettings, stage: str) -> FitSettings:
         max_steps=STEPS,
         absolute_tolerance=SETTLED_COST,
         allowed_excess=ALLOWED_EXCESS,
+        hopeless_excess=HOPELESS_EXCESS,
+        one_of_each=ONE_OF_EACH,
         stage=stage,
     )
 
@@ -344,7 +362,7 @@ def fitted_from(search: JointSearch, model: FittedModel) -> FittedModel:
     """The effects of `model`, fitted with every free parameter of `search` from its values; `model` where that fit has no number."""
     error = search.error(model)
     stage = "fitting the base model with the values of presets free"
-    _fit_side_by_side(search, [(model.effects, model.values)], error, stage, ())
+    _fit_side_by_side(search, [(model.effects, model.values)], error, stage, compared=False)
     return search.fitted.get(model.effects, model)
 
 

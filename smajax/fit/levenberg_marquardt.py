@@ -34,13 +34,22 @@ from jaxtyping import Array, Bool, Float, Int
 from smajax.core.parameters import parameters
 from smajax.core.progress import BestFit, Progress, Stage, quiet
 from smajax.core.result_cache import ResultCache
-from smajax.fit.bounded_descent import BoundedDampedNewtonDescent, DescentState, GainRatioSearch, SearchState
+from smajax.fit.bounded_descent import (
+    MIN_SCALE,
+    TINY,
+    BoundedDampedNewtonDescent,
+    DescentState,
+    GainRatioSearch,
+    SearchState,
+    bounded_quadratic_minimum,
+)
 from smajax.fit.predicted import chunks, predicted_and_derivatives
 from smajax.fit.problem import FitTask, Problem
 
 MAX_STEPS = 120
 TOLERANCE = 1e-8  # of the cost: what the last step may still lower it by, and predict; scipy's too
 MAX_DAMPING = 1e10  # at which no step lowers the cost
+TWICE = 2.0  # the model's decrease: of a fit that is far from its optimum it says too little
 PADDING = 8  # free parameters are padded to a multiple of this: one compiled program serves fits of several sizes
 DESCENT, SEARCH = BoundedDampedNewtonDescent(), GainRatioSearch()
 
@@ -62,7 +71,9 @@ class FitSettings:
 
     A fit ends where a step lowers its cost by less than `tolerance` of it, or by less than `absolute_tolerance`, and
     predicted no more. Of `allowed_excess`, (steps, cost) each: after so many steps a fit ends whose cost is above the least
-    of all by more than that; `least_cost` is that of fits that have ended elsewhere.
+    of all by more than that; `least_cost` is that of fits that have ended elsewhere. `hopeless_excess`, (steps, cost): the same of
+    what a fit is still to come to, by twice the decrease that its derivatives promise. `one_of_each`: after so many steps one fit alone goes on, the best, of those that
+    free the same parameters; 0: all do.
     """
 
     max_steps: int = MAX_STEPS
@@ -70,6 +81,8 @@ class FitSettings:
     absolute_tolerance: float = 0.0
     allowed_excess: tuple[tuple[int, float], ...] = ()
     least_cost: float = float("inf")
+    hopeless_excess: tuple[int, float] | None = None
+    one_of_each: int = 0
     cache: ResultCache = field(default_factory=ResultCache)
     progress: Progress = quiet
     stage: str = "fitting"
@@ -248,7 +261,7 @@ def levenberg_marquardt(
     def running() -> list[int]:
         return [k for k, state in enumerate(states) if state.status == Status.RUNNING]
 
-    limits = settings.allowed_excess, settings.least_cost
+    limits = settings.allowed_excess, settings.least_cost, settings.hopeless_excess, settings.one_of_each
     settled = settings.max_steps, settings.tolerance, settings.absolute_tolerance, *limits
     key = cache.key((problem, list(tasks)), "levenberg_marquardt", outputs if outputs is not None else "", *settled)
     cached = cache.load(key)
@@ -267,6 +280,8 @@ def levenberg_marquardt(
             break
         advance(going)
         states = _without_exceeding(states, number + 1, settings)
+        if number + 1 == settings.one_of_each:
+            states = _best_of_each(tasks, states)
     cache.save(key, _packed(states, settings.max_steps))
     progress(Stage(settings.stage, 1.0))
     return [_ended(task, state, settings) for task, state in zip(tasks, states, strict=True)]
@@ -290,16 +305,45 @@ def _best(
 
 
 def _without_exceeding(states: Sequence[LMState], steps: int, settings: FitSettings) -> list[LMState]:
-    """Fits end that after these steps are too far above the least cost."""
-    excess = min((0.5 * most for least, most in settings.allowed_excess if steps >= least), default=np.inf)
-    limit = min((float(state.f) for state in states), default=np.inf)
-    limit = min(limit, 0.5 * settings.least_cost) + excess
+    """Fits end that after these steps are too far above the least cost, or promise to stay so."""
+    excess = min((0.5 * most for after, most in settings.allowed_excess if steps >= after), default=np.inf)
+    least = min(min((float(state.f) for state in states), default=np.inf), 0.5 * settings.least_cost)
+    after, most = settings.hopeless_excess or (0, np.inf)
+    hopeless = 0.5 * most if steps >= after else np.inf
+
+    def exceeds(state: LMState) -> bool:
+        above = float(state.f) - least
+        return above > excess or (above > hopeless and above - TWICE * float(_promised(state.descent)) > hopeless)
+
+    return [_ended_as_exceeded(one) if one.status == Status.RUNNING and exceeds(one) else one for one in states]
+
+
+def _best_of_each(tasks: Sequence[FitTask], states: Sequence[LMState]) -> list[LMState]:
+    """Of running fits that free the same parameters the one of the least cost goes on."""
+    best: dict[tuple[int, ...], float] = {}
+    for task, state in zip(tasks, states, strict=True):
+        key = tuple(task.slots.tolist())
+        best[key] = min(best.get(key, np.inf), float(state.f))
     return [
-        dataclasses.replace(state, status=np.asarray(int(Status.EXCEEDED)))
-        if state.status == Status.RUNNING and float(state.f) > limit
+        _ended_as_exceeded(state)
+        if state.status == Status.RUNNING and float(state.f) > best[tuple(task.slots.tolist())]
         else state
-        for state in states
+        for task, state in zip(tasks, states, strict=True)
     ]
+
+
+def _ended_as_exceeded(state: LMState) -> LMState:
+    return dataclasses.replace(state, status=np.asarray(int(Status.EXCEEDED)))
+
+
+@jax.jit
+def _promised(descent: DescentState) -> Float[Array, ""]:
+    """What f falls by to the least value of the quadratic model within the bounds."""
+    least = MIN_SCALE * jnp.max(jnp.diag(descent.hessian), initial=TINY)
+    matrix = descent.hessian + least * jnp.eye(len(descent.y))
+    low, high = DESCENT.lower - descent.y, DESCENT.upper - descent.y
+    step = bounded_quadratic_minimum(matrix, descent.gradient, low, high)
+    return -(descent.gradient @ step + 0.5 * step @ descent.hessian @ step)
 
 
 def _ended(task: FitTask, state: LMState, settings: FitSettings) -> Fit:

@@ -5,13 +5,17 @@ Each pair of a point and a direction is one run of a compiled program, in forwar
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from typing import TypeVar
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 
+from smajax.core.operating_system import available_cores
 from smajax.core.parameters import set_vector
 from smajax.engine import program
 from smajax.fit.packed_runs import predict_run
@@ -20,6 +24,7 @@ from smajax.model.system import System
 from smajax.model.types import Series
 from smajax.simulation.steppers import Integration
 
+Result = TypeVar("Result")
 MAX_BYTES = 2**28  # of predicted outputs at once: of long runs some points after the others
 FEW = 256  # points up to which derivatives that nobody needs are quicker than compiling a second program without them
 
@@ -141,11 +146,24 @@ def predicted_and_derivatives(
     if directions == 0:
         return predicted_at(problem, points), np.zeros((count, 0, *problem.batch.output.shape))
     pairs = np.repeat(points, directions, axis=0), tangents.reshape(count * directions, -1)
-    values, derivatives = [], []
+    calls: list[Callable[[], tuple[np.ndarray, np.ndarray]]] = []
     for number, run in enumerate(_runs(problem)):
         at, along = (_of_run(problem, part, number) for part in pairs)
         scalars = {**_columns("value", at), **_columns("tangent", along)}
-        value, derivative = program(_along, run, tuple(scalars))(run, scalars)
-        values.append(value[::directions])
-        derivatives.append(derivative.reshape(count, directions, *derivative.shape[1:]))
+        calls.append(partial(program(_along, run, tuple(scalars)), run, scalars))
+    results = _side_by_side(calls)
+    values = [value[::directions] for value, _ in results]
+    derivatives = [derivative.reshape(count, directions, *derivative.shape[1:]) for _, derivative in results]
     return np.concatenate(values, axis=1), np.concatenate(derivatives, axis=2)
+
+
+def _side_by_side(calls: Sequence[Callable[[], Result]]) -> list[Result]:
+    """What the calls give: of few points one run leaves cores idle, which another takes."""
+    workers = min(len(calls), available_cores())
+    if workers < 2:
+        return [call() for call in calls]
+    try:
+        with ThreadPoolExecutor(workers) as pool:
+            return list(pool.map(lambda call: call(), calls))
+    except RuntimeError:  # no room for another thread under a cap on memory
+        return [call() for call in calls]

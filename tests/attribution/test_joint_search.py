@@ -219,7 +219,7 @@ def test_two_models_that_are_as_likely_do_not_take_turns(monkeypatch: pytest.Mon
     search.fitted = {one.effects: one, other.effects: other}
     monkeypatch.setattr(joint_search, "independent_error", lambda model, *_: model.rms)
     monkeypatch.setattr(joint_search, "_grouped", lambda *_: [])
-    monkeypatch.setattr(joint_search, "_fit_side_by_side", lambda *_: None)
+    monkeypatch.setattr(joint_search, "_fit_side_by_side", lambda *_, **__: None)
     monkeypatch.setattr(joint_search, "_linear", lambda *_: (None, None))
     for name in ("_neighbours", "_promising"):
         monkeypatch.setattr(joint_search, name, lambda *_: [])

@@ -28,6 +28,7 @@ from smajax.fit.levenberg_marquardt import (
     NormalEquations,
     Status,
     _advanced,
+    _best_of_each,
     _initial_state,
     _without_exceeding,
 )
@@ -139,6 +140,35 @@ def test_fits_far_above_the_best_end_after_as_many_steps_as_allowed() -> None:
     elsewhere = dataclasses.replace(allowed, least_cost=9.0)  # of fits in another program
     states = _without_exceeding([far], 6, elsewhere)
     assert [int(state.status) for state in states] == [Status.EXCEEDED]
+
+
+def test_a_fit_ends_that_promises_to_stay_far_above_the_best() -> None:
+    """By the least value of its quadratic model: cost 200 with a column that takes off 10, or 190, of it."""
+    best = _advanced(_initial_state(_task(np.full(1, 0.5)), 8), (10.0, np.zeros(1), np.eye(1)), TOLERANCES)
+    settings = FitSettings(hopeless_excess=(4, 50.0))
+    for decrease, steps, expected in (
+        (10.0, 4, Status.EXCEEDED),
+        (10.0, 3, Status.RUNNING),
+        (190.0, 4, Status.RUNNING),
+    ):
+        # The minimum of f = r^T r / 2 lies 0.1 away, within the bounds, and is lower by decrease / 2.
+        gradient, hessian = np.array([decrease / 0.1]), np.array([[decrease / 0.1**2]])
+        far = _advanced(_initial_state(_task(np.full(1, 0.5)), 8), (200.0, gradient, hessian), TOLERANCES)
+        assert [int(one.status) for one in _without_exceeding([best, far], steps, settings)] == [
+            Status.RUNNING,
+            expected,
+        ]
+
+
+def test_of_fits_that_free_the_same_the_best_alone_goes_on() -> None:
+    one, other = _task(np.full(1, 0.5)), _task(np.full(2, 0.5))
+    tasks, costs = [one, one, other], [3.0, 2.0, 9.0]
+    states = [
+        _advanced(_initial_state(task, 8), (cost, np.ones(len(task.slots)), np.eye(len(task.slots))), TOLERANCES)
+        for task, cost in zip(tasks, costs, strict=True)
+    ]
+    left = [int(state.status) for state in _best_of_each(tasks, states)]
+    assert left == [Status.EXCEEDED, Status.RUNNING, Status.RUNNING]
 
 
 def test_a_step_to_a_jacobian_that_is_not_finite_is_rejected() -> None:
