@@ -87,7 +87,10 @@ def test_the_page_is_there_after_the_base_fit_and_says_what_is_to_come(tmp_path:
     assert record["verdict"] == "not finished"
     assert record["remaining"] == known.remaining
     assert record["summary"][0].startswith("Not finished: the search for effects")
-    assert "Not finished" in (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
+    page = (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
+    assert "Not finished" in page
+    assert f"None of the {len(known.effects)} candidates has been fitted so far." in page
+    assert "by posterior probability" not in page  # a table without a number
     assert "not finished: the search for effects" in sma.load_model(tmp_path / "report").warnings[0]
     assert sma.load_model(tmp_path / "report").values["convection_coefficient"] == known.before[0].value
 
