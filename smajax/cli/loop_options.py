@@ -38,10 +38,40 @@ Noise = Annotated[
     ),
 ]
 
+# Of a sweep, whose controllers are on a filter where nobody says another.
+FilterOfSweep = Annotated[
+    str | None,
+    typer.Option(
+        "--estimator",
+        help=f"`printed`, `model` or `adaptive` filter, '' for the true state, then without noise or delay; {OF_FILE} `adaptive`",
+        autocompletion=completion.estimators,
+    ),
+]
+DelayOfSweep = Annotated[
+    int | None,
+    typer.Option(
+        "--delay", callback=within(0), help=f"control periods until a command arrives; {OF_FILE} 1, of the true state 0"
+    ),
+]
+NoiseOfSweep = Annotated[
+    str,
+    typer.Option(
+        "--noise",
+        help="noise of the readings (1 sigma), 0.1deg or 20um, without a unit in deg, or in mm of a length; default that of the model file, else 0.1deg, or "
+        "of a length what the same strain of the wire moves; none of the true state",
+    ),
+]
+Quantum = Annotated[
+    str,
+    typer.Option(
+        help="step between two values of the readings, 0.1deg or 20um, without a unit in deg, or in mm of a length; default as the noise, none where a noise is given"
+    ),
+]
 
-def noise_option(text: str, unit: PositionUnit) -> float | None:
-    """A noise in the unit shown; None of "". Raises typer.BadParameter."""
+
+def noise_option(text: str, unit: PositionUnit, option: str = "--noise") -> float | None:
+    """A noise, or a quantum, in the unit shown; None of "". Raises typer.BadParameter."""
     from smajax.control.interface import noise_of
 
-    with refused("'--noise'"):
+    with refused(f"'{option}'"):
         return noise_of(text, unit) if text else None

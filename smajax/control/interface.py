@@ -14,10 +14,11 @@ from smajax.control.estimators.base import AbstractEstimator
 from smajax.control.load_equation import moving_load
 from smajax.control.measured_state import Sensor
 from smajax.control.position_unit import DEGREES, PositionUnit, position_range, unit_of
-from smajax.control.presets import FILTERS
+from smajax.control.presets import FILTERS, READING_STRAIN
 from smajax.control.scales import is_arm
 from smajax.core.names import close_matches
 from smajax.core.units import UnitError, parse_quantity
+from smajax.core.wording import counted
 from smajax.model.system import System
 from smajax.model.types import Scalar
 
@@ -63,10 +64,11 @@ def check_set_points(system: System, set_points: Sequence[float]) -> None:
     )
 
 
-def check_interface(filtered: str, noise: float, period: float, dt: float) -> None:
-    """ValueError for a filter there is not, a noise (deg or mm) that is no size, or a period (s) of no whole steps of `dt`."""
-    if not 0.0 <= noise < math.inf:
-        raise ValueError(f"a noise is a size in the unit of the reading, 0 or more; not {noise:g}.")
+def check_interface(filtered: str, noise: float, period: float, dt: float, quantum: float = 0.0) -> None:
+    """ValueError for a filter there is not, a noise or quantum (deg or mm) that is no size, or a period (s) of no whole steps of `dt`."""
+    for what, size in (("noise", noise), ("quantum", quantum)):
+        if not 0.0 <= size < math.inf:
+            raise ValueError(f"a {what} is a size in the unit of the reading, 0 or more; not {size:g}.")
     if filtered and filtered not in FILTERS:
         raise ValueError(f"no filter `{filtered}`{close_matches(filtered, FILTERS, 'there are')}.")
     steps = period / dt
@@ -83,20 +85,36 @@ def noise_of(noise: float | str, unit: PositionUnit) -> float:
     return value
 
 
-def interface_of(system: System, filtered: str, noise: float, period: float, dt: float, delay: int) -> Interface:
-    """What lies between: the filter by name, noise in deg or mm, period in s, delay in periods."""
+def default_noise(system: System) -> float:
+    """Standard deviation of a reading, and step of its counter, where nobody says another, in the unit shown: 0.1 deg of the arm.
+
+    Of any load what the same strain of the wire moves, which is also what the filter `adaptive` takes for the noise.
+    """
+    per_strain = 1.0 / float(moving_load(system).contraction(system.wire))
+    return float(f"{float(unit_of(system).of(READING_STRAIN * per_strain)):.2g}")
+
+
+def interface_of(
+    system: System, filtered: str, noise: float, period: float, dt: float, delay: int, quantum: float = 0.0
+) -> Interface:
+    """What lies between: the filter by name, noise and quantum in deg or mm, period in s, delay in periods."""
+    unit = unit_of(system)
+    sensor = Sensor(noise_sigma=float(unit.to_own(noise)), quantum=float(unit.to_own(quantum)))
     return Interface(
         FILTERS[filtered](system) if filtered else None,
-        Sensor(noise_sigma=float(unit_of(system).to_own(noise))) if noise else None,
+        sensor if noise or quantum else None,
         round(period / dt),
         delay,
     )
 
 
-def between_in_words(filtered: str, noise: float, period: float, delay: int, unit: PositionUnit = DEGREES) -> str:
+def between_in_words(
+    filtered: str, noise: float, period: float, delay: int, unit: PositionUnit = DEGREES, quantum: float = 0.0
+) -> str:
     """The same in a sentence."""
     what = "angle" if unit.is_angle else "position"
     reads = f"their states from the filter `{filtered}`" if filtered else "the true state"
     read = f"the {what} with {noise:g}{unit.symbol} of noise" if noise else f"the {what} without noise"
-    late = f", commands {delay} periods late" if delay else ""
-    return f"Controllers are called every {1e3 * period:g} ms{late} and are told {reads}, {read}."
+    steps = f" in steps of {quantum:g}{unit.symbol}" if quantum else ""
+    late = f", commands {counted(delay, 'period')} late" if delay else ""
+    return f"Controllers are called every {1e3 * period:g} ms{late} and are told {reads}, {read}{steps}."

@@ -79,6 +79,9 @@ class LoopInUse(NamedTuple):
     estimator: str = ""
 
 
+LOOP_WITHOUT_FILTER = LoopInUse()
+
+
 def settings_of(system: System, loop: LoopInUse, noise: float) -> LoopSettings:
     """Those of a loop on this plant, whose own limit they have. noise: rad or m."""
     limit = float(system.drive.largest_command())
@@ -143,8 +146,10 @@ OPTIONS = {
 }
 
 
-def joined(files: Mapping[str, LoopSettings], given: LoopSettings) -> LoopInUse:
-    """What is given, and for the rest what the files of gains say, each by its controller.
+def joined(
+    files: Mapping[str, LoopSettings], given: LoopSettings, otherwise: LoopInUse = LOOP_WITHOUT_FILTER
+) -> LoopInUse:
+    """What is given, and for the rest what the files of gains say, each by its controller; what nobody says is as in `otherwise`.
 
     Raises ValueError where files differ in what is not given.
     """
@@ -157,7 +162,7 @@ def joined(files: Mapping[str, LoopSettings], given: LoopSettings) -> LoopInUse:
             raise ValueError(f"the gains were tuned with several values of {name}, {each}: say which with {option}.")
         value = own if own is not None else next(iter(said.values()), None)
         chosen |= {} if value is None else {name: value}
-    return LoopInUse(**chosen)
+    return otherwise._replace(**chosen)
 
 
 def sentences(

@@ -196,6 +196,9 @@ def model_filter(system: System) -> ModelFilter:
     )
 
 
+READING_STRAIN = 3.2e-5  # of the wire, which moves the arm by 0.1 deg: noise of a usual reading
+
+
 def adaptive_filter(system: System) -> AdaptiveFilter:
     """`model_filter` that also estimates the convection and, of a load that has them, damping and inertia.
 
@@ -208,7 +211,7 @@ def adaptive_filter(system: System) -> AdaptiveFilter:
         "velocity_walk": less * filtered.velocity_walk,
         "temperature_walk": less * filtered.temperature_walk,
         "fraction_walk": 3e-4,
-        "reading_noise": 3.2e-5 / moving_load(system).contraction(system.wire),
+        "reading_noise": READING_STRAIN / moving_load(system).contraction(system.wire),
     }
     return AdaptiveFilter(
         filter=set_parameters(filtered, walks),

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import io
+import json
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -14,7 +16,6 @@ from smajax.control.plants import Plants, plant_set
 from smajax.control.reference import clock
 from smajax.control.sweep.run_sweep import (
     CACHED,
-    LINES,
     ControllerSweep,
     SweepResults,
     SweepSettings,
@@ -29,6 +30,7 @@ from smajax.report.drawing import UPRIGHT
 from smajax.report.next_steps import after_sweep
 from smajax.report.series_plot import SeriesPlot
 from smajax.report.sweep_dataset import as_dataset
+from smajax.report.sweep_numbers import IN_PICTURE, comparison_digest, digest_of, lines_digest, map_numbers
 from smajax.report.sweep_page import (
     NO_REMARKS,
     Remarks,
@@ -42,7 +44,7 @@ from smajax.report.sweep_page import (
 from smajax.report.sweep_pictures import common_limits, draw_comparison, draw_curves, draw_lines, draw_maps, lines_plot
 from smajax.report.sweep_record import as_json
 
-MAPS = (10.0, 7.6)  # inches
+MAPS, CURVES = (10.0, 14.0), (10.0, 7.6)  # inches
 
 
 def files_of(controllers: Sequence[str]) -> list[str]:
@@ -69,33 +71,45 @@ def write_sweep(
     found = plant_set(system, plants)
     grid = settings.grid_on(found)
     time = np.asarray(clock(settings.seconds, settings.dt))
-    target = line_target(system, grid)
+    target, air = line_target(system, grid), assumed_air(system)
     upright: dict[str, bytes] = {}
     plots: dict[str, SeriesPlot] = {}
     results: list[ControllerSweep] = []
 
-    def write_picture(name: str, size: tuple[float, float], draw: Callable[[Figure], None]) -> None:
-        replace(out / name, _png(draw, size, 90))
-        upright[name] = _png(draw, (UPRIGHT, size[1]), 140)
+    def write_picture(name: str, size: tuple[float, float], draw: Callable[[Figure], None], numbers: str) -> None:
+        replace(out / name, as_png(draw, size, 90, numbers))
+        upright[name] = as_png(draw, (UPRIGHT, size[1]), 140, numbers)
 
     for one in sweeps:
         results.append(one)
         write_rows(out / f"{one.name}.csv", grid, one)
-        over_grid = draw_maps if grid.second else draw_curves
-        write_picture(f"{one.name}_maps.png", MAPS, partial(over_grid, grid=grid, sweep=one))
+        over_grid, size = (draw_maps, MAPS) if grid.second else (draw_curves, CURVES)
+        numbers = digest_of(map_numbers(grid, one))
+        write_picture(f"{one.name}_maps.png", size, partial(over_grid, grid=grid, sweep=one, air=air), numbers)
         if one.lines:
-            plots[one.name] = lines_plot(time, LINES, one, target, found.unit)
-            lines = partial(draw_lines, time=time, ratios=LINES, sweep=one, target=target, unit=found.unit)
-            write_picture(f"{one.name}_lines.png", (11.0, 3.1 * -(-len(one.lines) // 3)), lines)
+            plots[one.name] = lines_plot(time, settings.line_ratios, one, target, found.unit, air)
+            what: dict[str, Any] = {
+                "ratios": settings.line_ratios,
+                "sweep": one,
+                "target": target,
+                "unit": found.unit,
+                "air": air,
+            }
+            height = 3.1 * -(-len(one.lines) // 3)
+            write_picture(
+                f"{one.name}_lines.png", (11.0, height), partial(draw_lines, time=time, **what), lines_digest(one)
+            )
         progress(Message(f"{one.name}: {grid.size:,} closed loops; {failures(one)}. {perturbed_sentence(grid, one)}"))
     if grid.second and len(results) > 1:  # all are known now, and so the scale of the colours
         limits = common_limits(grid, results)
         for one in results:
-            write_picture(f"{one.name}_maps.png", MAPS, partial(draw_maps, grid=grid, sweep=one, limits=limits))
-    whole = SweepResults(settings, tuple(results), assumed_air(system), found)
+            draw = partial(draw_maps, grid=grid, sweep=one, limits=limits, air=air)
+            write_picture(f"{one.name}_maps.png", MAPS, draw, digest_of(map_numbers(grid, one)))
+    whole = SweepResults(settings, tuple(results), air, found)
     comparison = partial(draw_comparison, targets=grid.targets, sweeps=whole.sweeps, position=found.unit)
-    write_picture("comparison.png", (10.0, 11.0), comparison)
-    replace(out / "sweep.json", as_json(whole, command, remarks))
+    record = as_json(whole, command, remarks)
+    write_picture("comparison.png", (10.0, 11.0), comparison, comparison_digest(json.loads(record)))
+    replace(out / "sweep.json", record)
     replace(out / "sweep.nc", as_netcdf(as_dataset(whole, command)))
     pictures = {name: ((out / name).read_bytes(), narrow) for name, narrow in upright.items()}
     best = ranked(whole)[0].name
@@ -104,10 +118,11 @@ def write_sweep(
     return whole
 
 
-def _png(draw: Callable[[Figure], None], size: tuple[float, float], dpi: int) -> bytes:
+def as_png(draw: Callable[[Figure], None], size: tuple[float, float], dpi: int, numbers: str) -> bytes:
+    """numbers: a digest of those that are drawn, which the picture holds as text."""
     figure, image = Figure(figsize=size), io.BytesIO()
     draw(figure)
-    figure.savefig(image, dpi=dpi, facecolor="white", format="png")
+    figure.savefig(image, dpi=dpi, facecolor="white", format="png", metadata={IN_PICTURE: numbers})
     return image.getvalue()
 
 

@@ -25,7 +25,8 @@ from smajax.report.integration_words import integration_sentence
 from smajax.report.next_steps import ARM, PlantWords, Step, section
 from smajax.report.plain_page import bullets, folded, headline, table, whole
 from smajax.report.series_plot import SeriesPlot, moving, samples_of
-from smajax.report.sweep_pictures import ROUNDING, SHOWN, merit_values, nominal_gain, shown_in
+from smajax.report.sweep_numbers import SHOWN, merit_values, nominal_gain, shown_in
+from smajax.report.sweep_pictures import ROUNDING
 
 Pictures = Mapping[str, tuple[bytes, bytes]]  # file name -> the picture, and the one for a telephone
 
@@ -188,9 +189,9 @@ def page(
         else "The position has arrived when it is within a hundredth of the stroke."
     )
     drawn_as = (
-        "Maps: median over the set points"
+        "Maps: median over the set points that the plant can reach, and the worst of them beside it"
         if grid.second
-        else "Lines: median over the set points; bands: their range, where all have a value"
+        else "Lines: median over the set points that the plant can reach; bands: their range, where all have a value"
     )
     head = [
         "controller",

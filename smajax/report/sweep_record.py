@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,8 @@ import numpy as np
 from smajax.control.least_time import Distance
 from smajax.control.sweep.run_sweep import ControllerSweep, LeastTimes, SweepResults
 from smajax.core.provenance import made_with
+from smajax.report.sweep_numbers import comparison_digest, digest_of, lines_digest, map_numbers, nominal_gain
 from smajax.report.sweep_page import NO_REMARKS, Remarks, answer, conclusions
-from smajax.report.sweep_pictures import nominal_gain
 
 
 def as_json(results: SweepResults, command: str = "", remarks: Remarks = NO_REMARKS) -> str:
@@ -24,7 +25,7 @@ def as_json(results: SweepResults, command: str = "", remarks: Remarks = NO_REMA
         return [float(value) if np.isfinite(value) else None for value in np.asarray(values).ravel()]
 
     batch = grid.plants.batch
-    record = {
+    record: dict[str, Any] = {
         "headline": answer(results),
         "conclusions": conclusions(results),
         "between": settings.between,
@@ -44,6 +45,7 @@ def as_json(results: SweepResults, command: str = "", remarks: Remarks = NO_REMA
                 else {}
             ),
             "ratios": plain(grid.ratios),
+            "maps": {one.name: map_numbers(grid, one) for one in results.sweeps},
             f"set_points_{own}": plain(grid.targets),
             "gain_ratios": plain(grid.gains),
             "loops": grid.size,
@@ -59,7 +61,25 @@ def as_json(results: SweepResults, command: str = "", remarks: Remarks = NO_REMA
         "command": command,
         "made_with": made_with(),
     }
-    return json.dumps(record, indent=2) + "\n"
+    record["pictures"] = picture_digests(record, results.sweeps)
+    return _in_lines(json.dumps(record, indent=2)) + "\n"
+
+
+def picture_digests(record: Mapping[str, Any], sweeps: Sequence[ControllerSweep]) -> dict[str, str]:
+    """File name -> digest of the numbers that the picture draws; the picture has it too, as the text `sweep_numbers.IN_PICTURE`."""
+    maps = record["sweep"]["maps"]
+    return {
+        "comparison.png": comparison_digest(record),
+        **{f"{name}_maps.png": digest_of(numbers) for name, numbers in maps.items()},
+        **{f"{one.name}_lines.png": lines_digest(one) for one in sweeps if one.lines},
+    }
+
+
+def _in_lines(text: str) -> str:
+    """Lists of numbers in one line each."""
+    return re.sub(
+        r"\[[^\[\]{}\"]*\]", lambda one: re.sub(r"\s+", " ", one[0]).replace("[ ", "[").replace(" ]", "]"), text
+    )
 
 
 def _as_record(found: Distance | None) -> dict[str, float | None] | None:

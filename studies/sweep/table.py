@@ -1,4 +1,4 @@
-"""`python -m studies.sweep.table`: the table of `README.md`, from what `smajax sweep --out studies/sweep` wrote to `sweep.json`."""
+"""`python -m studies.sweep.table`: the tables of `README.md`, from the `sweep.json` of each sweep of `run.py`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from smajax.control.presets import CONTROLLERS, with_printed_law
 from smajax.core.files import replace
 
 HERE = Path(__file__).parent
-MARK = "<!-- table -->"
+MARK, OTHERS_MARK = "<!-- table -->", "<!-- others -->"
+OTHERS = {"near": "convection and damping, 0.9 to 1.1", "inertia": "inertia 0.5 to 2, ambient -10 to +20 K"}
 HEAD = (
     "controller",
     "plant",
@@ -56,12 +57,36 @@ def table(record: dict[str, Any]) -> str:
     return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
 
 
+def others_table(records: dict[str, dict[str, Any]]) -> str:
+    """A row a controller: share of the runs in reach that settle, and their settling time over the least time, in each of the `OTHERS`."""
+    head = ["controller", *(f"{words}: {what}" for words in OTHERS.values() for what in ("settles", "over least time"))]
+    lines = [head, ["---"] * len(head)]
+    for name in next(iter(records.values()))["controllers"]:
+        cells = [name]
+        for folder in OTHERS:
+            found = records[folder]["sweep"]["settling_over_least_time"][name]["all_controllers"]
+            share = 100.0 * found["settled"] / (found["settled"] + found["never"])
+            cells += [f"{share:.0f} %", times(found)]
+        lines.append(cells)
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
+
+
+def record_of(folder: str) -> dict[str, Any]:
+    """The record of a sweep of `run.py`, by its folder."""
+    return json.loads((HERE / folder / "sweep.json").read_text(encoding="utf-8"))
+
+
+def put(text: str, mark: str, inner: str) -> str:
+    """The text with `inner` between the two marks."""
+    before, _, rest = text.partition(mark)
+    return f"{before}{mark}\n\n{inner}\n\n{mark}{rest.partition(mark)[2]}"
+
+
 def main() -> None:
-    """Write it."""
-    record = json.loads((HERE / "sweep.json").read_text(encoding="utf-8"))
-    before, _, rest = (HERE / "README.md").read_text(encoding="utf-8").partition(MARK)
-    _, _, after = rest.partition(MARK)
-    replace(HERE / "README.md", f"{before}{MARK}\n\n{table(record)}\n\n{MARK}{after}")
+    """Write them."""
+    text = put((HERE / "README.md").read_text(encoding="utf-8"), MARK, table(record_of(".")))
+    others = others_table({folder: record_of(folder) for folder in OTHERS})
+    replace(HERE / "README.md", put(text, OTHERS_MARK, others))
 
 
 if __name__ == "__main__":

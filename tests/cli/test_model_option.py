@@ -146,7 +146,7 @@ def test_loops_of_a_sweep_run_on_the_plant_of_another_file(tmp_path: Path, model
     plant = hotter_model().save(tmp_path / "plant.toml")
     loop: list[str | Path] = ["--model", model, "--plant", plant, "--noise", "0", "--seconds", "8"]
     words = ["--controllers", "pid", "--set-point", "5mm", "--gain-ratios", "1", "--tolerance", "none"]
-    ended = smajax("sweep", *loop, *words, "--out", tmp_path / "swept")
+    ended = smajax("sweep", *loop, *words, "--estimator", "", "--out", tmp_path / "swept")
     assert ended.code == 0, ended.said
     record = json.loads((tmp_path / "swept" / "sweep.json").read_text(encoding="utf-8"))
     assert record["sweep"]["plants"] == {"convection_coefficient": [120.0], "radiation.emissivity": [0.8]}

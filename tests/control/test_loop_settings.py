@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from smajax.control.gains_file import GainsFileError, read_gains
-from smajax.control.loop_settings import LoopSettings, joined
+from smajax.cli.commands.sweep import loop_of
+from smajax.control.gains_file import Gains, GainsFileError, read_gains
+from smajax.control.loop_settings import LoopInUse, LoopSettings, joined
 from smajax.control.run_request import LoopRequest, RunRequest, run_closed
 from smajax.control.run_result import RunResult
 from smajax.data.model_file.of_presets import model_of_presets
@@ -112,6 +113,16 @@ def test_files_of_gains_that_differ_need_an_option_that_says_which() -> None:
         joined(files, LoopSettings())
     assert joined(files, LoopSettings(period=0.05)).period == 0.05
     assert joined({"vsc1": LoopSettings()}, LoopSettings()).period == 0.01
+
+
+def test_a_sweep_is_on_a_filter_unless_options_or_a_file_say_the_true_state() -> None:
+    assert loop_of((), LoopSettings()) == LoopInUse(delay=1, estimator="adaptive")
+    assert loop_of((), LoopSettings(delay=0)) == LoopInUse(delay=0, estimator="adaptive")
+    assert loop_of((), LoopSettings(estimator="")) == LoopInUse()
+    assert loop_of((), LoopSettings(estimator="", delay=2)) == LoopInUse(delay=2)
+    of_file = Gains("vsc3", {}, loop=LoopSettings(estimator="", period=0.02))
+    assert loop_of((of_file,), LoopSettings()) == LoopInUse(period=0.02)
+    assert loop_of((of_file,), LoopSettings(estimator="model")) == LoopInUse(None, 0.02, 1, "model")
 
 
 def test_the_plant_may_be_another_model_than_the_controllers(tmp_path: Path, gains: Path) -> None:

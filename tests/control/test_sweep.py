@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import io
 import json
 from pathlib import Path
 from typing import Any
@@ -12,22 +13,26 @@ import jax
 import numpy as np
 import pytest
 import xarray as xr
+from PIL import Image
 
 from smajax.control.closed_loop import simulate_closed_loop
+from smajax.control.compose import compose
 from smajax.control.figures_of_merit import MERIT_UNITS, Merit, merit
 from smajax.control.gains_file import Gains
-from smajax.control.interface import Interface
+from smajax.control.interface import Interface, interface_of
 from smajax.control.least_time import least_reach_times
+from smajax.control.load_equation import moving_load
 from smajax.control.measured_state import Sensor
 from smajax.control.presets import CONTROLLERS
 from smajax.control.reference import clock, constant
 from smajax.control.sweep.batched_loops import LoopSetup, closed_loops
 from smajax.control.sweep.grid import Grid, loop_rows, sweep_ratios
-from smajax.control.sweep.run_sweep import SweepSettings, may_resume, sweep_controllers
+from smajax.control.sweep.run_sweep import TRUE_STATE, SweepSettings, may_resume, sweep_controllers, sweep_settings_for
 from smajax.core.parameters import get_parameters, set_parameters
 from smajax.model.rigs import arm
 from smajax.model.system import System
-from smajax.report.sweep_folder import write_sweep
+from smajax.report.sweep_folder import as_png, write_sweep
+from smajax.report.sweep_numbers import IN_PICTURE, comparison_digest, digest_of
 from tests.helpers.in_browser import HOSTILE, faults
 from tests.helpers.machine_code import by_machine_code
 
@@ -35,7 +40,9 @@ pytestmark = pytest.mark.usefixtures("blank_pictures")
 
 RATIOS = ("payload_ratio", "supply_ratio")
 # One step a sample, so that a loop is that of `simulate_closed_loop`.
-SETTINGS = SweepSettings(("vsc3",), "payload", "supply", 2, (0.0, 30.0), (1.0,), seconds=3.0, tolerance=None)
+SETTINGS = SweepSettings(
+    ("vsc3",), "payload", "supply", 2, (0.0, 30.0), (1.0,), seconds=3.0, tolerance=None, **TRUE_STATE
+)
 
 
 def run_sweep(system: System, settings: SweepSettings, out: Path, command: str = "") -> None:
@@ -165,7 +172,7 @@ def test_finished_controllers_are_cached(folder: Path, monkeypatch: pytest.Monke
     monkeypatch.setattr("smajax.control.sweep.run_sweep.closed_loops", never)
     run_sweep(arm(), SETTINGS, folder)
     assert (folder / "vsc3.csv").read_bytes() == before
-    other = SweepSettings(("vsc3",), "payload", "supply", 2, (0.0, 31.0), (1.0,), seconds=3.0)
+    other = dataclasses.replace(SETTINGS, set_points=(0.0, 31.0))
     with pytest.raises(AssertionError, match="computed again"):
         run_sweep(arm(), other, folder)
     # Another law is another plant, though every parameter is the same.
@@ -232,3 +239,61 @@ def test_only_controllers_may_be_added_to_a_folder() -> None:
     assert not may_resume(before, dataclasses.replace(SETTINGS, seconds=4.0).record())
     tuned = (Gains("vsc3", {"boundary": 0.1}),)
     assert not may_resume(before, dataclasses.replace(SETTINGS, tuned=tuned).record())
+
+
+def test_by_default_a_filter_reads_noise_and_steps_and_commands_are_late() -> None:
+    """Of the arm those of the requirement, of another load the same strain of the wire; with the true state none of them."""
+    default, true = sweep_settings_for(arm(), ["pid"]), sweep_settings_for(arm(), ["pid"], estimator="")
+    assert (default.estimator, default.noise, default.quantum, default.delay) == ("adaptive", 0.1, 0.1, 1)
+    assert "late and are told their states from the filter `adaptive`" in default.between
+    assert "the angle with 0.1° of noise in steps of 0.1°." in default.between
+    assert (true.estimator, true.noise, true.quantum, true.delay) == ("", 0.0, 0.0, 0)
+    assert true.between == "Controllers are called every 10 ms and are told the true state, the angle without noise."
+    assert sweep_settings_for(arm(), ["pid"], noise=0.2).quantum == 0.0
+    spring = compose("flexinol_table_3_2", "bias_spring", "flexinol_voltage")
+    strain = 1e-3 * sweep_settings_for(spring, ["pid"]).noise * float(moving_load(spring).contraction(spring.wire))
+    assert strain == pytest.approx(np.radians(0.1) * float(moving_load(arm()).contraction(arm().wire)), rel=0.06)
+    with pytest.raises(ValueError, match="a quantum is a size"):
+        dataclasses.replace(default, quantum=-0.1).check(arm())
+
+
+def test_a_counted_reading_reaches_the_loop() -> None:
+    """A run with steps in its readings is the single loop with them."""
+    system, rows = arm(), loop_rows({}, 0.3)
+    controller, gain = CONTROLLERS["vsc3"].make(system), CONTROLLERS["vsc3"].main_gain
+    between = interface_of(system, "", 0.0, 0.01, 0.01, 0, 5.0)
+    assert between.sensor is not None
+    assert float(between.sensor.quantum) == pytest.approx(np.radians(5.0))
+    found = closed_loops(LoopSetup(system, controller, gain, 2.0, interface=between), rows).merits
+    plain = closed_loops(LoopSetup(system, controller, gain, 2.0), rows).merits
+    loop = by_machine_code(simulate_closed_loop)(
+        system, controller, constant(clock(2.0, 0.01), 0.3), 0.01, sensor=between.sensor, key=jax.random.key(0)
+    )
+    assert float(found.energy[0]) == pytest.approx(float(merit(loop, system).energy), rel=1e-6)
+    assert abs(float(found.energy[0]) / float(plain.energy[0]) - 1.0) > 1e-4
+
+
+def test_mismatches_may_be_small() -> None:
+    near = dataclasses.replace(SETTINGS, ratio_range=(0.9, 1.1), points=5)
+    assert near.grid.ratios[[0, 2, 4]] == pytest.approx([0.9, 1.0, 1.1], abs=1e-12)
+    assert (SETTINGS.line_ratios, near.line_ratios) == ((0.5, 0.8, 1.0, 1.25, 2.0), (0.9, 0.967, 1.0, 1.031, 1.1))
+    with pytest.raises(ValueError, match=r"from below 1 to above 1, such as 0.9 to 1.1; not 1.1 to 0.9"):
+        dataclasses.replace(near, ratio_range=(1.1, 0.9)).check(arm())
+
+
+def test_the_record_has_a_digest_of_the_numbers_that_each_picture_draws(folder: Path) -> None:
+    record = json.loads((folder / "sweep.json").read_text(encoding="utf-8"))
+    assert set(record["pictures"]) == {path.name for path in folder.glob("*.png")}
+    assert record["pictures"]["comparison.png"] == comparison_digest(record)
+    maps = record["sweep"]["maps"]["vsc3"]
+    assert record["pictures"]["vsc3_maps.png"] == digest_of(maps)
+    maps["energy"]["worst"][1][1] *= 1.01
+    assert record["pictures"]["vsc3_maps.png"] != digest_of(maps)
+    record["controllers"]["vsc3"]["energy"][0] *= 1.01
+    assert record["pictures"]["comparison.png"] != comparison_digest(record)
+
+
+def test_a_picture_holds_the_digest_of_its_numbers_as_text(drawn: None) -> None:
+    image = as_png(lambda figure: None, (1.0, 1.0), 50, digest_of([1.0, None]))
+    with Image.open(io.BytesIO(image)) as picture:
+        assert picture.info[IN_PICTURE] == digest_of([1.00001, None]) != digest_of([1.001, None])

@@ -25,7 +25,7 @@ from smajax.control.plants import plant_set
 from smajax.control.presets import CONTROLLERS
 from smajax.control.reference import clock, constant
 from smajax.control.sweep.grid import loop_rows
-from smajax.control.sweep.run_sweep import SweepSettings, sweep_controllers, sweep_settings_for
+from smajax.control.sweep.run_sweep import TRUE_STATE, SweepSettings, sweep_controllers, sweep_settings_for
 from smajax.control.tune.evaluate import TuningProblem
 from smajax.control.tune.scenarios import held_out, tuned_on
 from smajax.control.tune.settings import TuneSettings, regulation_weights, settings_for
@@ -204,7 +204,9 @@ def test_plants_may_have_effects_that_the_assumed_model_lacks() -> None:
     wider = sma.extended(HANGING, ["latent_heat"])
     stacked = set_parameters(wider, {name: jnp.asarray(values) for name, values in plants.items()})
     assert set(plant_set(HANGING, stacked).columns) == set(plants)
-    settings = SweepSettings(("pid",), set_points=(8.0,), gain_ratios=(1.0,), seconds=4.0, tolerance=None, unit="mm")
+    settings = SweepSettings(
+        ("pid",), set_points=(8.0,), gain_ratios=(1.0,), seconds=4.0, tolerance=None, unit="mm", **TRUE_STATE
+    )
     (swept,) = sweep_controllers(HANGING, settings, plants=stacked)
     (alone,) = sweep_controllers(HANGING, settings, plants={"load_mass": [0.075]})
     np.testing.assert_allclose(swept.nominal.energy, alone.nominal.energy, rtol=1e-9)
@@ -247,7 +249,16 @@ def test_wrong_settings_of_a_load_are_errors() -> None:
 
 
 SWEEP = SweepSettings(
-    ("pid", "sld"), "convection", "spring_preload", 2, (5.0, 10.0), (1.0,), 30.0, tolerance=None, unit="mm"
+    ("pid", "sld"),
+    "convection",
+    "spring_preload",
+    2,
+    (5.0, 10.0),
+    (1.0,),
+    30.0,
+    tolerance=None,
+    unit="mm",
+    **TRUE_STATE,
 )
 
 
@@ -285,7 +296,7 @@ def test_a_sweep_of_a_bias_spring_is_in_millimetres(tmp_path: Path) -> None:
 
 def test_a_sweep_over_a_batch_has_a_row_a_plant(tmp_path: Path) -> None:
     settings = SweepSettings(
-        ("vsc2",), set_points=(5.0, 15.0), gain_ratios=(1.0,), seconds=4.0, tolerance=None, unit="mm"
+        ("vsc2",), set_points=(5.0, 15.0), gain_ratios=(1.0,), seconds=4.0, tolerance=None, unit="mm", **TRUE_STATE
     )
     write_sweep(
         HANGING, settings, sweep_controllers(HANGING, settings, tmp_path, plants=PLANTS), tmp_path, plants=PLANTS

@@ -193,6 +193,7 @@ PLAIN = set(
         "prediction",
         "prepare",
         "probability",
+        "quantum",
         "ratio",
         "reference",
         "record",

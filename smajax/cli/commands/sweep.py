@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from smajax.cli import completion
-from smajax.cli.loop_options import Delay, Estimator, LoopSeconds, Noise, Period
+from smajax.cli.loop_options import (
+    DelayOfSweep,
+    FilterOfSweep,
+    LoopSeconds,
+    NoiseOfSweep,
+    Period,
+    Quantum,
+    noise_option,
+)
 from smajax.cli.options import (
     Finely,
     Json,
@@ -28,7 +36,7 @@ from smajax.cli.terminal import browse, command_line, console, resumable
 
 if TYPE_CHECKING:
     from smajax.control.gains_file import Gains
-    from smajax.control.loop_settings import LoopSettings
+    from smajax.control.loop_settings import LoopInUse, LoopSettings
     from smajax.control.sweep.run_sweep import SweepSettings
     from smajax.model.system import System
 
@@ -56,6 +64,7 @@ class _Options:
     controllers: str | None
     over: str | None
     points: int | None
+    ratios: str | None
     set_points: str | None
     gain_ratios: str | None
     fast: bool
@@ -93,11 +102,25 @@ class _Options:
         given: dict[str, Any] = {**self.mismatches(plant), **set_points_of(plant, self.set_points, self.fast), **loop}
         if self.points or self.fast:
             given["points"] = self.points or 3
+        if self.ratios is not None:
+            given["ratio_range"] = numbers("--ratios", self.ratios)
+            if len(given["ratio_range"]) != 2:
+                raise typer.BadParameter(f"two numbers, such as 0.9,1.1, not `{self.ratios}`", param_hint="--ratios")
         if self.gain_ratios is not None or self.fast:
             given["gain_ratios"] = numbers("--gain-ratios", "1" if self.gain_ratios is None else self.gain_ratios)
         controllers = None if named == ["all"] else [*dict.fromkeys(part for part in named if part)]
         with refused():
             return sweep_settings_for(plant, controllers, tuned=tuned, **given)
+
+
+def loop_of(tuned: Sequence[Gains], given: LoopSettings) -> LoopInUse:
+    """Of the options, else of the files of gains, else of a sweep: a filter and a delay; without a filter neither. Raises ValueError."""
+    from smajax.control.loop_settings import LoopInUse, joined
+    from smajax.control.sweep.run_sweep import DELAY, FILTER
+
+    files = {one.controller: one.loop for one in tuned}
+    loop = joined(files, given, LoopInUse(delay=DELAY, estimator=FILTER))
+    return loop if loop.estimator else joined(files, given)
 
 
 def _sentences(tuned: Sequence[Gains], given: LoopSettings, plant: System, settings: SweepSettings) -> tuple[str, ...]:
@@ -134,6 +157,12 @@ def sweep(
             help="mismatches from 0.5 to 2 times (-50% to +100%) along each side of a map; default 15",
         ),
     ] = None,
+    ratios: Annotated[
+        str | None,
+        typer.Option(
+            help="least and largest mismatch, plant over the controller's model, such as 0.9,1.1; default 0.5,2"
+        ),
+    ] = None,
     set_points: Annotated[
         str | None,
         typer.Option(
@@ -150,10 +179,11 @@ def sweep(
         str | None, typer.Option(help="multiples of the controller's main gain; default 0.5,0.7,1,1.4,2")
     ] = None,
     seconds: LoopSeconds = None,
-    estimator: Estimator = None,
-    noise: Noise = "",
+    estimator: FilterOfSweep = None,
+    noise: NoiseOfSweep = "",
+    quantum: Quantum = "",
     period: Period = None,
-    delay: Delay = None,
+    delay: DelayOfSweep = None,
     tolerance: Finely = "auto",
     out: Annotated[
         Path,
@@ -173,6 +203,8 @@ def sweep(
     By default on the arm of the source; with --model on a fitted model, and on plants drawn from its posterior; with --plant on the one of that file; with --wire, --load and --drive on any load that moves, where the gains are those of the
     arm scaled to the load's stroke, force and time and to the drive's limit.
 
+    The controllers get a filter's states, of readings with noise and steps, and their commands arrive a period late; with `--estimator ''` the true state at once.
+
     After Ctrl-C the same command resumes with the controllers that are not finished.
 
     What can differ between the plant and the controller's model: inertia (inertia_ratio), damping, convection
@@ -191,7 +223,7 @@ def sweep(
     prepare(cores=True)
     from smajax.cli.progress_display import displayed
     from smajax.cli.result_folder import FolderTaken, claimed
-    from smajax.control.loop_settings import LoopSettings, joined
+    from smajax.control.loop_settings import LoopSettings
     from smajax.control.position_unit import unit_of
     from smajax.control.reach import reach_of, reach_sentence
     from smajax.control.scales import is_arm
@@ -203,14 +235,17 @@ def sweep(
     tuned = _tuned(tuple(gains or ()), plant)
     given = LoopSettings(period=period, delay=delay, estimator=estimator)
     with refused():
-        loop = joined({one.controller: one.loop for one in tuned}, given)
+        loop = loop_of(tuned, given)
     assumed = plant.system(loop.command_limit)
     plants = plant.plants(SEED, others=over is not None, limit=loop.command_limit)
     with refused():
         sigma, source = plant.noise(noise, unit_of(assumed))
-    between: dict[str, Any] = {"period": loop.period, "delay": loop.delay, "estimator": loop.estimator, "noise": sigma}
+    between: dict[str, Any] = {"period": loop.period, "delay": loop.delay, "estimator": loop.estimator}
+    between |= {"noise": sigma} if noise or source else {}
+    counted = noise_option(quantum, unit_of(assumed), "--quantum")
+    between |= {} if counted is None else {"quantum": counted}
     between |= {} if seconds is None else {"seconds": seconds}
-    options = _Options(controllers, over, points, set_points, gain_ratios, fast)
+    options = _Options(controllers, over, points, ratios, set_points, gain_ratios, fast)
     settings = options.settings(assumed, tuned, tolerance=tolerance_of(tolerance), **between)
     with refused():
         settings.check(assumed, plants)

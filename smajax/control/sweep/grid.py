@@ -44,9 +44,10 @@ def check_mismatches(first: str, second: str, known: Sequence[str] = tuple(MISMA
         raise ValueError(f"`{first}` twice, expected one mismatch or two different ones of {', '.join(known)}.")
 
 
-def sweep_ratios(points: int) -> np.ndarray:
-    """`points` ratios from 0.5 to 2, evenly by logarithm; an odd number includes 1."""
-    return np.exp(np.linspace(np.log(LEAST), np.log(MOST), points))
+def sweep_ratios(points: int, least: float = LEAST, most: float = MOST) -> np.ndarray:
+    """`points` ratios from `least` to `most`, evenly by logarithm to either side of 1; an odd number includes 1."""
+    sides = np.linspace(-1.0, 1.0, points)
+    return np.exp(np.abs(sides) * np.log(np.where(sides < 0.0, least, most)))
 
 
 @dataclass(frozen=True)

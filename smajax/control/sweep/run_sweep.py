@@ -8,6 +8,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ import numpy as np
 from smajax.control.controllers.base import AbstractController
 from smajax.control.figures_of_merit import Merit
 from smajax.control.gains_file import Gains
-from smajax.control.interface import between_in_words, check_interface, check_set_points, interface_of
+from smajax.control.interface import between_in_words, check_interface, check_set_points, default_noise, interface_of
 from smajax.control.least_time import LIMITS, Distance, command_limit, distance
 from smajax.control.mismatch import MISMATCHES, default_mismatches
 from smajax.control.plants import Plants, PlantSet, carrying, plant_set
@@ -23,7 +24,7 @@ from smajax.control.position_unit import PositionUnit, check_unit, default_set_p
 from smajax.control.presets import CONTROLLERS, check_controller, controllers_for
 from smajax.control.scales import is_arm, seconds_for
 from smajax.control.sweep.batched_loops import LoopSetup, closed_loops, integrated_setup, least_times, positions
-from smajax.control.sweep.grid import OF_ARM, PLANT, Grid, loop_rows, sweep_ratios
+from smajax.control.sweep.grid import LEAST, MOST, OF_ARM, PLANT, Grid, loop_rows, sweep_ratios
 from smajax.core.files import json_line, writing
 from smajax.core.parameters import get_parameters, set_parameters
 from smajax.core.progress import Event, Progress, Stage, quiet
@@ -32,10 +33,13 @@ from smajax.core.result_cache import arrays
 from smajax.model.system import System
 from smajax.simulation.integration_error import AUTO, Tolerance
 
-LINES = (0.5, 0.8, 1.0, 1.25, 2.0)  # ratios of which the angle over time is stored
+LINES = (0.5, 0.8, 1.0, 1.25, 2.0)  # ratios of which the angle over time is stored, where they go from 0.5 to 2
 LINE_TARGET = 40.0  # deg, of the arm
+# What lies between plant and controller where nobody says another: a filter of noisy, counted readings, and a delay; or nothing.
+FILTER, DELAY = "adaptive", 1
+TRUE_STATE: Mapping[str, Any] = MappingProxyType({"estimator": "", "noise": 0.0, "quantum": 0.0, "delay": 0})
 CACHED = f"finished/*-{'[0-9a-f]' * 16}.npz"  # files of the cache, below the folder of the sweep
-LEAST = "with least times"
+WITH_LEAST_TIMES = "with least times"
 SAVED_LEAST = ("least_", "own_least_")
 FIELDS = tuple(field.name for field in dataclasses.fields(Merit))
 
@@ -52,13 +56,15 @@ class SweepSettings:
     gain_ratios: tuple[float, ...] = (0.5, 0.7, 1.0, 1.4, 2.0)  # times the controller's main gain
     seconds: float = 10.0
     dt: float = 0.01
-    estimator: str = ""  # the filter that estimates the state; "": the controllers get the true state
-    noise: float = 0.0  # standard deviation of the readings
+    estimator: str = FILTER  # the filter that estimates the state; "": the controllers get the true state
+    noise: float = 0.1  # standard deviation of the readings
+    quantum: float = 0.1  # between two values of the readings
     period: float = 0.01  # s, sample time of the controller, a whole number of `dt`
-    delay: int = 0  # control periods until a command reaches the amplifier
+    delay: int = DELAY  # control periods until a command reaches the amplifier
     tuned: tuple[Gains, ...] = ()  # in place of the presets'
     tolerance: Tolerance = AUTO  # as `run_batch`'s; None is one step a sample
     unit: str = "deg"  # of set points and noise, as `position_unit.unit_of` the plant
+    ratio_range: tuple[float, float] = (LEAST, MOST)  # of plant over the controller's model: below and above 1
 
     @property
     def grid(self) -> Grid:
@@ -70,7 +76,14 @@ class SweepSettings:
         targets, gains = unit_named(self.unit).to_own(self.set_points), np.asarray(self.gain_ratios)
         if plants.batch is not None:
             return Grid(PLANT, "", 1.0 + np.arange(len(plants.batch)), targets, gains, plants)
-        return Grid(self.first, self.second, sweep_ratios(self.points), targets, gains, plants)
+        return Grid(self.first, self.second, sweep_ratios(self.points, *self.ratio_range), targets, gains, plants)
+
+    @property
+    def line_ratios(self) -> tuple[float, ...]:
+        """Plant over model of the lines: `LINES`, or as far between 1 and the ends of another range."""
+        ends = [self.ratio_range[0] if ratio < 1.0 else self.ratio_range[1] for ratio in LINES]
+        shares = [abs(math.log2(ratio)) for ratio in LINES]
+        return tuple(round(end**share, 3) for end, share in zip(ends, shares, strict=True))
 
     def record(self) -> dict[str, Any]:
         """For JSON."""
@@ -82,7 +95,8 @@ class SweepSettings:
     def between(self) -> str:
         """The interface between plant and controller, in words."""
         files = ", ".join(f"{one.controller} has gains from a file" for one in self.tuned)
-        words = between_in_words(self.estimator, self.noise, self.period, self.delay, unit_named(self.unit))
+        unit = unit_named(self.unit)
+        words = between_in_words(self.estimator, self.noise, self.period, self.delay, unit, self.quantum)
         return f"{words} {files}." if files else words
 
     def check(self, system: System, plants: Plants | None = None) -> PlantSet:
@@ -97,7 +111,12 @@ class SweepSettings:
             raise ValueError(
                 f"ratios of the main gain are numbers above 0, at least one; not {', '.join(map(str, self.gain_ratios))}."
             )
-        check_interface(self.estimator, self.noise, self.period, self.dt)
+        low, high = self.ratio_range
+        if not 0.0 < low < 1.0 < high < math.inf:
+            raise ValueError(
+                f"ratios of plant over model go from below 1 to above 1, such as 0.9 to 1.1; not {low:g} to {high:g}."
+            )
+        check_interface(self.estimator, self.noise, self.period, self.dt, self.quantum)
         unused = [gains.controller for gains in self.tuned if gains.controller not in self.controllers]
         if unused:
             raise ValueError(
@@ -111,10 +130,16 @@ class SweepSettings:
 def sweep_settings_for(system: System, controllers: Sequence[str] | None = None, **given: Any) -> SweepSettings:
     """A sweep on any plant: what is not given is the arm's, or that of the load's unit, stroke, time and mismatches.
 
-    controllers: by default all that this plant gives what they need. given: fields of `SweepSettings`.
+    controllers: by default all that this plant gives what they need. given: fields of `SweepSettings`. With `estimator=""` the rest of
+    what lies between is by default as in `TRUE_STATE`; with a noise and no quantum the readings have no steps.
     """
     defaults: dict[str, Any] = {"unit": unit_of(system).shown, "seconds": seconds_for(system)}
     defaults["first"], defaults["second"] = default_mismatches(system)
+    if given.get("estimator", FILTER):
+        sigma = default_noise(system)
+        defaults |= {"noise": sigma, "quantum": 0.0 if "noise" in given else sigma}
+    else:
+        defaults |= TRUE_STATE
     if not is_arm(system):
         defaults["set_points"] = default_set_points(system)
     return SweepSettings(
@@ -236,10 +261,14 @@ def _sweep(
     preset = CONTROLLERS[name]
     plant = preset.plant(system)
     tuned = tuple(gains for gains in settings.tuned if gains.controller == name)
-    # LEAST: what an older version cached has no least times.
+    # What an older version cached has no least times.
     key = digest(
         plant,
-        [f"{LEAST} {shared:g}", str(dataclasses.replace(settings, controllers=(name,), tuned=tuned)), *plants.marks],
+        [
+            f"{WITH_LEAST_TIMES} {shared:g}",
+            str(dataclasses.replace(settings, controllers=(name,), tuned=tuned)),
+            *plants.marks,
+        ],
     )[:16]
     file = None if folder is None else folder / "finished" / f"{name}-{key}.npz"
     saved: dict[str, Any] | None = None if file is None else arrays(file)
@@ -293,13 +322,14 @@ def _computed(
 
     preset, grid, lined = CONTROLLERS[name], settings.grid_on(plants), _lined(plants)
     plant, controller = _plant_and_controller(system, name, settings)
+    between = settings.estimator, settings.noise, settings.period, settings.dt
     setup = LoopSetup(
         plant,
         controller,
         preset.main_gain,
         settings.seconds,
         settings.dt,
-        interface_of(plant, settings.estimator, settings.noise, settings.period, settings.dt, settings.delay),
+        interface_of(plant, *between, settings.delay, settings.quantum),
         perturbation=plants.perturbation,
     )
     # One batch, one program.
@@ -309,7 +339,8 @@ def _computed(
     angles: Sequence[np.ndarray] = ()
     if lined:
         target = line_target(plant, grid)
-        rows = np.concatenate([loop_rows({one: np.asarray(LINES)}, target, plants=plants) for one in lined])
+        ratios = np.asarray(settings.line_ratios)
+        rows = np.concatenate([loop_rows({one: ratios}, target, plants=plants) for one in lined])
         angles = list(positions(setup, rows).reshape(len(lined), len(LINES), -1))
     inside, nominal = slice(grid.size), grid.size + np.arange(len(grid.targets))
     result: dict[str, Any] = {"failed": outcome.failed_at[inside].reshape(grid.shape)}
