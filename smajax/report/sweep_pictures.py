@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedFormatter, FixedLocator
 
 from smajax.control.position_unit import DEGREES, PositionUnit
@@ -236,19 +237,19 @@ def _over_least(sweep: ControllerSweep) -> np.ndarray:
 def _draw_least(axes: Axes, targets: np.ndarray, sweeps: Sequence[ControllerSweep]) -> None:
     """The least time under the times of the controllers, a line for each plant among them: before it no command is there."""
     drawn: list[np.ndarray] = []
+    lines: list[Line2D] = []
     for one in sweeps:
         least = np.where(np.isfinite(one.least.nominal), one.least.nominal, np.nan)
         if np.isnan(least).all() or any(np.allclose(least, other, equal_nan=True) for other in drawn):
             continue
         drawn.append(least)
         look: dict[str, Any] = {"color": "black", "linewidth": 2.2, "linestyle": DASHES[(len(drawn) - 1) % len(DASHES)]}
-        whose = "" if len(drawn) == 1 else f" on the plant of {one.name}"
-        axes.plot(targets, least, label=f"least time{whose}", zorder=1, **look)
+        of_plant = "least time" if len(drawn) == 1 else f"that of {one.name}'s plant"
+        lines += axes.plot(targets, least, label=of_plant, zorder=1, **look)
         axes.fill_between(targets, 0.0, least, color="black", alpha=0.06, linewidth=0)
     if drawn:
         axes.set_ylim(bottom=0.0)
-        of_least = [one for one in axes.get_lines() if str(one.get_label()).startswith("least time")]
-        axes.legend(handles=of_least, frameon=False, fontsize=8, loc="upper right")
+        axes.legend(handles=lines, frameon=False, fontsize=8, loc="upper right")
 
 
 def draw_comparison(
