@@ -204,7 +204,7 @@ def simulate_closed_loop(  # the public form: what goes inwards is a `ClosedLoop
 
     Its command is held in between, as a digital controller holds it, and reaches the amplifier `delay` control periods
     later. Without an `estimator` it measures the true state, with the position as `sensor` (with noise drawn from `key`)
-    reads it. `disturbance` are further inputs of the system, such as `load_torque` or `ambient_temperature`, each of
+    reads it. `disturbance` are further inputs of the system, such as `load_torque`, `added_mass` or `ambient_temperature`, each of
     shape (n,). A plain array for `wanted` means set points (`reference.resting`). `initial` defaults to rest.
     `integration`: how finely between two samples; error-controlled steps have derivatives in forward mode alone.
 

@@ -36,6 +36,7 @@ ABOUT = {
     "duty": "share of the time that the switch is closed, 0 to 1",
     "mass": "mass that hangs on the wire",
     "load_torque": "disturbance against the angle",
+    "added_mass": "payload beside that of the model",
     "temperature": "temperature of the wire",
     "stress": "stress of the wire",
     "strain": "strain of the wire",

@@ -15,6 +15,7 @@ INPUT_UNITS: Mapping[str, str] = MappingProxyType(
         "duty": "1",
         "mass": "kg",
         "load_torque": "N m",
+        "added_mass": "kg",
         "temperature": "degC",
         "stress": "Pa",
         "strain": "1",

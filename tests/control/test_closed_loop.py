@@ -14,6 +14,7 @@ import pytest
 from smajax.control.closed_loop import check_answers, simulate_closed_loop
 from smajax.control.controllers.base import AbstractController
 from smajax.control.figures_of_merit import band_of, merit
+from smajax.control.load_equation import moving_load
 from smajax.control.measured_state import MeasuredState, Sensor
 from smajax.control.presets import CONTROLLERS, pid, quick_stress_sliding
 from smajax.control.reference import Reference, clock, constant, ramp, resting, sampled, sine, steps
@@ -107,6 +108,24 @@ def test_integral_action_rejects_disturbances() -> None:
         simulate_closed_loop(ARM, pid(ARM), target, DT, disturbance={"wind": pushed})
     with pytest.raises(ValueError, match="samples"):
         simulate_closed_loop(ARM, pid(ARM), target, DT, disturbance={"load_torque": pushed[:-1]})
+
+
+def test_a_payload_that_is_put_down_is_carried_and_is_inertia() -> None:
+    """At rest the stress is that of the statics with the mass; beside it the moment of inertia is (m_p + dm + m_a/3) L^2."""
+    time = clock(12.0, DT)
+    target = constant(time, 0.2)
+    loop = RUN(ARM, pid(ARM), target, DT, disturbance={"added_mass": jnp.where(time < 6.0, 0.0, 0.02)})
+    lever = 2.0 * 8.25e-3 * 0.25 * np.pi * 150e-6**2
+    for at, added in ((595, 0.0), (-5, 0.02)):
+        x = float(loop.run.position[at])
+        assert abs(x - 0.2) < 1e-2
+        torque = (0.05719 + added + 0.5 * 0.0187) * GRAVITY * 0.04738 * np.cos(x) + 3.871 * 0.048**2 * (x + np.pi / 4)
+        assert float(loop.run.stress[at]) == pytest.approx(torque / lever, rel=0.02)
+    assert np.abs(np.asarray(loop.run.position)[600:] - 0.2).max() > 0.02
+    load = moving_load(ARM)
+    heavier = load.inertia({"added_mass": jnp.asarray(0.02)})
+    assert float(heavier) == pytest.approx((0.05719 + 0.02 + 0.0187 / 3.0) * 0.04738**2, rel=1e-6)
+    assert float(load.inertia({})) == pytest.approx((0.05719 + 0.0187 / 3.0) * 0.04738**2, rel=1e-6)
 
 
 def test_sliding_control_follows_a_ramp_and_a_sine() -> None:

@@ -37,7 +37,7 @@ class Arm(AbstractMovingLoad):
         default=1.0,
     )
 
-    inputs_optional: ClassVar[frozenset[str]] = frozenset({"load_torque"})
+    inputs_optional: ClassVar[frozenset[str]] = frozenset({"load_torque", "added_mass"})
     reading: ClassVar[tuple[str, str]] = ("angle", "rad")
 
     def start(self) -> Scalar:
@@ -46,11 +46,15 @@ class Arm(AbstractMovingLoad):
     def limits(self) -> tuple[Scalar | float, Scalar | float]:
         return self.lower_stop, self.upper_stop
 
+    def payload(self, inputs: Inputs) -> Scalar:
+        """Mass at the end of the link, kg: with `added_mass`, which a run may put down or take up, at rest or without impact."""
+        return self.payload_mass + inputs["added_mass"] if "added_mass" in inputs else self.payload_mass
+
     def inertia(self, inputs: Inputs) -> Scalar:
-        return self.inertia_ratio * (self.payload_mass + self.link_mass / 3.0) * self.arm_length**2
+        return self.inertia_ratio * (self.payload(inputs) + self.link_mass / 3.0) * self.arm_length**2
 
     def resistance(self, position: Scalar, velocity: Scalar, inputs: Inputs) -> Scalar:
-        gravity = (self.payload_mass + 0.5 * self.link_mass) * GRAVITY * self.arm_length * cosine(position)
+        gravity = (self.payload(inputs) + 0.5 * self.link_mass) * GRAVITY * self.arm_length * cosine(position)
         spring = self.spring_stiffness * self.spring_lever**2 * (position - self.spring_rest_angle)
         # `load_torque`, N m, is a disturbance against +position.
         return gravity + spring + self.damping * velocity + inputs.get("load_torque", 0.0)
