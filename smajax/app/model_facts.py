@@ -95,16 +95,16 @@ def rows(wire: str, load: str, drive: str) -> tuple[Row, ...]:
         said = "" if origin is None else f"{ORIGIN[origin.kind]}: {origin.note}"
         found.append(
             Row(
-                name,
-                one.about,
-                one.unit,
-                shown(values[name], one.unit),
-                said,
-                one.low,
-                one.high,
-                values[name],
-                part,
-                part != "wire" or name in first,
+                name=name,
+                about=one.about,
+                unit=one.unit,
+                preset=shown(values[name], one.unit),
+                origin=said,
+                low=one.low,
+                high=one.high,
+                value=values[name],
+                part=part,
+                first=part != "wire" or name in first,
             )
         )
     return tuple(found)

@@ -161,15 +161,15 @@ def prepared(  # the stage's inputs, each once
     job = job_of(experiment, integration)
     start = job.problem.start_values()
     setting = Search(
-        job.problem,
-        job.unknowns,
-        job.bounds,
-        job.candidates,
-        cache,
-        progress,
-        experiment.outputs[0].noise_given,
-        job.held_out,
-        config,
+        problem=job.problem,
+        unknowns=job.unknowns,
+        bounds=job.bounds,
+        candidates=job.candidates,
+        cache=cache,
+        progress=progress,
+        noise_given=experiment.outputs[0].noise_given,
+        held_out=job.held_out,
+        config=config,
         declared=experiment.priors,
     )
     if integration is None:

@@ -107,18 +107,18 @@ def compare(job: Job, setting: Search, first: Model, final: Model | FittedModel)
                 states[which].append(_series(run, shown[which][run.name]))
         runs.append(
             RunFinding(
-                run.name,
-                "fit" if run.role == "fit" else "held-out",
-                run.time,
-                run.inputs,
-                run.output,
-                readings["before"],
-                readings["after"],
-                shown["after"][run.name],
-                offsets["before"],
-                offsets["after"],
-                errors["before"],
-                errors["after"],
+                name=run.name,
+                role="fit" if run.role == "fit" else "held-out",
+                time=run.time,
+                inputs=run.inputs,
+                measured=run.output,
+                before=readings["before"],
+                after=readings["after"],
+                states=shown["after"][run.name],
+                offset_before=offsets["before"],
+                offset_after=offsets["after"],
+                rmse_before=errors["before"],
+                rmse_after=errors["after"],
             )
         )
     noise = experiment.noise_sigma, experiment.outputs[0].noise_given

@@ -70,7 +70,17 @@ def job_of(experiment: Experiment, integration: Integration | None = None) -> Jo
     unknowns = tuple(unknown.name for unknown in experiment.unknowns)
     presets, of_presets = values_not_given(experiment, base, bounds)
     bounds |= of_presets
-    return Job(experiment, runs, problem, held_out, unknowns, bounds, names, presets, hidden)
+    return Job(
+        experiment=experiment,
+        fit_runs=runs,
+        problem=problem,
+        held_out=held_out,
+        unknowns=unknowns,
+        bounds=bounds,
+        candidates=names,
+        presets=presets,
+        hidden_by_one_force=hidden,
+    )
 
 
 def cannot_show(job: Job) -> tuple[str, ...]:

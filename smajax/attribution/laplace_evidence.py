@@ -103,19 +103,19 @@ def fitted_model(
     mask = np.asarray(joint.problem.batch.mask)
     correlation = min(correlation_time(split_runs(on_samples(residual, mask), mask)), LONGEST)
     return FittedModel(
-        effects,
-        np.asarray(values),
-        tuple(names),
-        scales,
-        float(residual @ residual),
-        matrix.T @ matrix,
-        precision,
-        factors,
-        log_prior,
-        tuple((k, float(deviations[k])) for k, name in enumerate(names) if joint.one_sided(name)),
-        residual,
-        float(np.sqrt(np.mean(residual**2))),
-        correlation,
+        effects=effects,
+        values=np.asarray(values),
+        names=tuple(names),
+        scales=scales,
+        squares=float(residual @ residual),
+        gram=matrix.T @ matrix,
+        precision=precision,
+        width_factors=factors,
+        log_prior=log_prior,
+        one_sided=tuple((k, float(deviations[k])) for k, name in enumerate(names) if joint.one_sided(name)),
+        residual=residual,
+        rms=float(np.sqrt(np.mean(residual**2))),
+        correlation=correlation,
     )
 
 

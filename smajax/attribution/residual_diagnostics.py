@@ -60,15 +60,15 @@ def diagnosed(
     ratio = rmse / noise_sigma
     white = p_value > WHITE
     return ResidualDiagnostics(
-        rmse,
-        noise_sigma,
-        ratio,
-        white,
-        p_value,
-        len(everything) / correlation_time(residuals),
-        by_phase,
-        correlation,
-        0.0 if noise_given else _filter_coefficient(residuals, noise_sigma, config),
+        rmse=rmse,
+        noise_sigma=noise_sigma,
+        ratio=ratio,
+        white=white,
+        whiteness_p_value=p_value,
+        independent=len(everything) / correlation_time(residuals),
+        by_phase=by_phase,
+        correlation=correlation,
+        filter_coefficient=0.0 if noise_given else _filter_coefficient(residuals, noise_sigma, config),
     )
 
 

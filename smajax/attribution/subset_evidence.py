@@ -147,17 +147,17 @@ def linear_model(joint: JointParameters, traces: Traces, variance: float, candid
                 target += columns[-1] * joint.deviation(name, value)
     matrix = np.stack(columns, axis=1) if columns else np.zeros((len(target), 0))
     return LinearModel(
-        traces,
-        joint,
-        unknowns,
-        places,
-        names,
-        np.asarray(scales),
-        matrix.T @ matrix / variance,
-        matrix.T @ target / variance,
-        np.asarray([joint.precision(name) for name in names]),
-        np.asarray([joint.one_sided(name) for name in names], dtype=bool),
-        _odds(joint, places),
+        traces=traces,
+        joint=joint,
+        unknowns=unknowns,
+        places=places,
+        names=names,
+        scales=np.asarray(scales),
+        gram=matrix.T @ matrix / variance,
+        right=matrix.T @ target / variance,
+        precision=np.asarray([joint.precision(name) for name in names]),
+        one_sided=np.asarray([joint.one_sided(name) for name in names], dtype=bool),
+        log_odds=_odds(joint, places),
     )
 
 

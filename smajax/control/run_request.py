@@ -359,15 +359,15 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
             )
     notes += _set_point_notes(assumed, position) or _reach_notes(setup, position, figures, by_set_point)
     return RunResult(
-        data,
-        plant,
-        figures,
-        tuple(notes),
-        by_set_point,
-        mismatches(assumed, plant),
-        said,
-        settings_of(assumed, own, sigma),
-        controller,
+        data=data,
+        system=plant,
+        merit=figures,
+        notes=tuple(notes),
+        by_set_point=by_set_point,
+        mismatches=mismatches(assumed, plant),
+        settings=said,
+        loop=settings_of(assumed, own, sigma),
+        controller=controller,
     )
 
 

@@ -356,16 +356,16 @@ def c_source(
         *_public(name, both, short),
     ]
     return CSource(
-        name,
-        both.block,
-        _header(both, short, sizes, single),
-        "\n".join(source),
-        tuple(both.parameters),
-        tuple(both.inputs),
-        both.block.outputs,
-        sizes,
-        {"start": both.double.start.cost.total, "step": both.double.step.cost.total},
-        single,
+        name=name,
+        block=both.block,
+        header=_header(both, short, sizes, single),
+        source="\n".join(source),
+        parameters=tuple(both.parameters),
+        inputs=tuple(both.inputs),
+        outputs=both.block.outputs,
+        state_bytes=sizes,
+        operations={"start": both.double.start.cost.total, "step": both.double.step.cost.total},
+        single_build=single,
     )
 
 

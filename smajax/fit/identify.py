@@ -150,15 +150,15 @@ def _estimates(setup: Setup, fitted: Fitted, known: Uncertainty) -> tuple[Estima
     start = dict(zip(setup.problem.names, setup.problem.start_values().tolist(), strict=True))
     return tuple(
         Estimate(
-            name,
-            unknown.unit,
-            fitted.values[name],
-            known.standard_error[name],
-            unknown.low,
-            unknown.high,
-            start[name],
-            unknown.prior,
-            known.remark[name],
+            name=name,
+            unit=unknown.unit,
+            value=fitted.values[name],
+            standard_error=known.standard_error[name],
+            lower=unknown.low,
+            upper=unknown.high,
+            start=start[name],
+            prior=unknown.prior,
+            remark=known.remark[name],
         )
         for name, unknown in setup.unknowns.items()
     )

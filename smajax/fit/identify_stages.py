@@ -242,18 +242,18 @@ def statistics_at(setup: Setup, fitted: Fitted, options: Options) -> Statistics:
     inflation = variance or max(ratio**2, 1e-300) * independent
     correlated, covariance = covariance_of(at, names, known, variance)
     return Statistics(
-        every_run,
-        everywhere,
-        at,
-        misfit,
-        residual,
-        white,
-        independent,
-        ratio,
-        inflation,
-        known,
-        correlated,
-        covariance,
+        every_run=every_run,
+        everywhere=everywhere,
+        at=at,
+        misfit=misfit,
+        residual=residual,
+        whiteness_p=white,
+        independent=independent,
+        ratio=ratio,
+        inflation=inflation,
+        uncertainty=known,
+        correlated=correlated,
+        covariance=covariance,
     )
 
 

@@ -204,13 +204,13 @@ def _series(
     present = np.isfinite(measured)
     error, inside = (measured - reading)[present], (np.abs(measured - reading) <= half)[present]
     return PredictedSeries(
-        output.name,
-        output.unit,
-        measured,
-        reading,
-        half,
-        output.noise_sigma if known is None else known.noise,
-        float(offset),
-        float(np.sqrt(np.mean(error**2))) if error.size else float("nan"),
-        float(np.mean(inside)) if error.size else float("nan"),
+        output=output.name,
+        unit=output.unit,
+        measured=measured,
+        reading=reading,
+        half_width=half,
+        noise=output.noise_sigma if known is None else known.noise,
+        offset=float(offset),
+        rmse=float(np.sqrt(np.mean(error**2))) if error.size else float("nan"),
+        coverage=float(np.mean(inside)) if error.size else float("nan"),
     )

@@ -4,6 +4,9 @@
 happens in each phase, and why, is told in `arm.cpp`; names are the same. A block of members goes through each phase
 together: short loops over the lanes of one flat array at offsets known to the compiler, which then needs no test of whether two
 of them overlap and makes vector instructions of every loop.
+
+More than 400 lines: the scheme is one function of 440, which numba has to see whole (its comment says why); a module of its own for
+the 150 lines of numbers before it would part names that both use, and leave one above 400 all the same.
 """
 
 from __future__ import annotations

@@ -94,19 +94,19 @@ def test_laplaces_evidence_is_the_linear_models_where_the_model_is_linear() -> N
         prior = odds - 0.5 * float(values @ values)
         size = len(values)
         return FittedModel(
-            effects,
-            values,
-            tuple("ab"[:size]),
-            np.ones(size),
-            float(left @ left),
-            gram,
-            np.ones(size),
-            {},
-            prior,
-            (),
-            left,
-            1.0,
-            1.0,
+            effects=effects,
+            values=values,
+            names=tuple("ab"[:size]),
+            scales=np.ones(size),
+            squares=float(left @ left),
+            gram=gram,
+            precision=np.ones(size),
+            width_factors={},
+            log_prior=prior,
+            one_sided=(),
+            residual=left,
+            rms=1.0,
+            correlation=1.0,
         )
 
     both = model(("a", "b"), columns.T @ columns, estimate, residual, np.log(0.003))

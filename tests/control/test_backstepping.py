@@ -268,30 +268,22 @@ ENDS = st.sampled_from([0.0, 1.0, 0.5, 1e-12, 1.0 - 1e-12]) | st.floats(0.0, 1.0
 @pytest.mark.slow  # those of runs are below
 @SETTINGS
 @given(
-    st.sampled_from(["one", "two"]),
-    st.floats(-0.8, 1.7),
-    st.sampled_from([0.0]) | st.floats(-20.0, 20.0),
-    st.sampled_from([0.0]) | st.floats(0.0, 5e8),
-    st.floats(-20.0, 200.0),
-    ENDS,
-    ENDS,
-    ENDS,
-    st.floats(-0.8, 1.7),
+    which=st.sampled_from(["one", "two"]),
+    state=st.builds(
+        MeasuredState,
+        position=st.floats(-0.8, 1.7),
+        velocity=st.sampled_from([0.0]) | st.floats(-20.0, 20.0),
+        stress=st.sampled_from([0.0]) | st.floats(0.0, 5e8),
+        temperature=st.floats(-20.0, 200.0),
+        martensite_fraction=ENDS,
+        xi_M=ENDS,
+        xi_A=ENDS,
+    ),
+    target=st.floats(-0.8, 1.7),
 )
-def test_every_state_has_a_finite_voltage_and_derivatives(
-    which: str,
-    position: float,
-    velocity: float,
-    stress: float,
-    temperature: float,
-    fraction: float,
-    xi_M: float,
-    xi_A: float,
-    target: float,
-) -> None:
+def test_every_state_has_a_finite_voltage_and_derivatives(which: str, state: MeasuredState, target: float) -> None:
     evaluate, gains = VOLTAGE[which]
-    state = (position, velocity, stress, temperature, fraction, xi_M, xi_A)
-    measured = MeasuredState(*(jnp.asarray(value) for value in state))
+    measured = jax.tree.map(jnp.asarray, state)
     voltage, slopes = evaluate(gains, measured, jnp.asarray(target))
     assert 0.0 <= float(voltage) <= float(TWO.largest_voltage)
     for leaf in jax.tree.leaves(slopes):

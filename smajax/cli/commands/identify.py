@@ -33,7 +33,7 @@ def _may_resume(before: Mapping[str, Any], now: Mapping[str, Any]) -> bool:
     return before == now or before == {**now, "--posterior": 0}
 
 
-# More than 8 parameters: typer reads the options from them.
+# More than 8 parameters and 80 lines: typer reads the options from them, and their help fills 30 lines.
 def identify_command(
     experiment: Annotated[Path, typer.Argument(help="experiment.toml, or the folder that holds it")],
     out: Annotated[Path, typer.Option(help="folder for identify.html and identify.json; fits are cached there")] = Path(

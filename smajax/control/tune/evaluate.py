@@ -180,20 +180,20 @@ class TuningProblem:
         arm = is_arm(self.system)
         length = 1.0 if arm else float(stroke_of(self.system) / arm_scales().position)
         problem = _Problem(
-            self.system,
-            self.controller,
-            jnp.asarray(self._low),
-            jnp.asarray(self._width),
-            clock(self.seconds, dt),
-            jnp.asarray(softness),
-            jnp.asarray(length),
-            jnp.asarray(factors_in(self.plants.unit)),
-            interface,
-            jax.random.key(self.seed),
-            self.integration,
-            self.names,
-            self.plants.perturbation,
-            self.preset.smoothed if smooth else None,
+            system=self.system,
+            controller=self.controller,
+            low=jnp.asarray(self._low),
+            width=jnp.asarray(self._width),
+            time=clock(self.seconds, dt),
+            softness=jnp.asarray(softness),
+            length=jnp.asarray(length),
+            factors=jnp.asarray(factors_in(self.plants.unit)),
+            interface=interface,
+            key=jax.random.key(self.seed),
+            integration=self.integration,
+            names=self.names,
+            perturbation=self.plants.perturbation,
+            smoothed=self.preset.smoothed if smooth else None,
         )
         count, size = len(points), scenarios.size
         columns = {f"at {name}": np.repeat(points[:, k], size) for k, name in enumerate(self.names)}

@@ -110,18 +110,18 @@ def begin(
     memory = adam.begin(points, scenarios, limits) if effort.by == "adam" else trust.begin(points)
     empty = np.full((effort.rounds, count), np.nan)
     return MultistartState(
-        0,
-        points,
-        np.ones(count, bool),
-        memory,
-        points.copy(),
-        np.full(count, np.inf),
-        empty,
-        empty.copy(),
-        np.zeros(effort.rounds, int),
-        problem.simulations,
-        0,
-        0,
+        round=0,
+        points=points,
+        alive=np.ones(count, bool),
+        memory=memory,
+        best=points.copy(),
+        best_rank=np.full(count, np.inf),
+        costs=empty,
+        excesses=empty.copy(),
+        ran=np.zeros(effort.rounds, int),
+        initial_loops=problem.simulations,
+        non_finite=0,
+        unusable=0,
     )
 
 
@@ -160,16 +160,16 @@ def next_round(
     non_finite = now.non_finite + int(seen.failed.sum())
     unusable = now.unusable + int(seen.unusable(goal.used).sum())
     return MultistartState(
-        number + 1,
-        points,
-        alive,
-        memory,
-        best,
-        best_rank,
-        costs,
-        excesses,
-        ran,
-        now.initial_loops,
-        non_finite,
-        unusable,
+        round=number + 1,
+        points=points,
+        alive=alive,
+        memory=memory,
+        best=best,
+        best_rank=best_rank,
+        costs=costs,
+        excesses=excesses,
+        ran=ran,
+        initial_loops=now.initial_loops,
+        non_finite=non_finite,
+        unusable=unusable,
     )

@@ -212,22 +212,22 @@ def _validated(
     progress(Stage("evaluating", 1.0))
     preset = np.asarray(get_parameters(problem.controller, problem.names)).tolist()
     return TuningResult(
-        settings,
-        dict(zip(problem.names, preset, strict=True)),
-        tuned,
-        problem.box,
-        {name: unit_on(table[name].unit, problem.system) for name in (*problem.names, *fixed)},
-        checks,
-        (float(cost[0]), float(cost[1])),
-        {name: (float(one[0]), float(one[1])) for name, one in excesses.items()},
-        descent,
-        evolution,
-        searched,
-        lines,
-        moves,
-        float(get_parameters(problem.system, [MISMATCHES["ambient"]])[0]),
-        problem.plants,
-        error,
+        settings=settings,
+        before=dict(zip(problem.names, preset, strict=True)),
+        after=tuned,
+        box=problem.box,
+        units={name: unit_on(table[name].unit, problem.system) for name in (*problem.names, *fixed)},
+        checks=checks,
+        costs=(float(cost[0]), float(cost[1])),
+        excesses={name: (float(one[0]), float(one[1])) for name, one in excesses.items()},
+        descent=descent,
+        evolution=evolution,
+        simulations=searched,
+        lines=lines,
+        moves=moves,
+        air=float(get_parameters(problem.system, [MISMATCHES["ambient"]])[0]),
+        plants=problem.plants,
+        integration=error,
     )
 
 
@@ -277,15 +277,15 @@ def _lines(problem: TuningProblem, settings: TuneSettings, tuned: Gains, inside:
     rows = np.column_stack([np.repeat(plants, len(targets), axis=0), np.tile(targets, len(plants))])
     rows = np.column_stack([rows, np.ones(len(rows))])
     setup = LoopSetup(
-        problem.system,
-        problem.controller,
-        problem.preset.main_gain,
-        settings.seconds,
-        STEP,
-        problem.interface,
-        settings.seed,
-        problem.integration,
-        problem.plants.perturbation,
+        system=problem.system,
+        controller=problem.controller,
+        main_gain=problem.preset.main_gain,
+        seconds=settings.seconds,
+        dt=STEP,
+        interface=problem.interface,
+        seed=settings.seed,
+        integration=problem.integration,
+        perturbation=problem.plants.perturbation,
     )
     angles = [
         positions(dataclasses.replace(setup, controller=controller), rows)

@@ -326,19 +326,8 @@ def experiment_of(path: Path, file: ExperimentFile, catalogue: Catalogue) -> Exp
     runs = [
         read_run(replace(reading, others=number > 0), run, overrides[run.name]) for number, run in enumerate(file.runs)
     ]
-    fit = [read for read in runs if read.run.role == "fit"]
-    outputs = [_output(path, file, name, units[name], fit) for name in output_names]
-    warnings = [text for read in runs for text in run_warnings(read, reading.step)]
-    if file.time is None or file.time.kind != "sample":
-        warnings += length_warnings(runs, "s" if file.time is None else file.time.unit)
-    warnings += heading_warnings(file.channels, file.time)
-    for run in file.runs:
-        warnings += heading_warnings(*own_columns(path, run, file.channels, file.time), run)
-    warnings += constant_warnings(runs)
-    for output, sensor_sigma in outputs:
-        warnings += quantum_warning(fit, output.name, sensor_sigma, output.unit)
-    warnings += copy_warnings(runs)
-    warnings += common_warnings(runs)
+    outputs = [_output(path, file, name, units[name], _of_fit(runs)) for name in output_names]
+    warnings = _log_warnings(file, reading, runs, outputs)
     heats = sorted(model.heats & runs[0].run.inputs.keys())
     warnings += magnitude_warnings(runs, None if model.scale is None else model.scale(values), heats, reading.step)
     warnings += _useless(file, model) + not_tried + _untold(file, free)
@@ -375,3 +364,23 @@ def experiment_of(path: Path, file: ExperimentFile, catalogue: Catalogue) -> Exp
         log_format=file.log_format,
         model_file=kept,
     )
+
+
+def _of_fit(runs: Sequence[ReadRun]) -> list[ReadRun]:
+    return [read for read in runs if read.run.role == "fit"]
+
+
+def _log_warnings(
+    file: ExperimentFile, reading: Reading, runs: Sequence[ReadRun], outputs: Sequence[tuple[Output, float]]
+) -> list[str]:
+    """Of the logs alone, whatever the model. outputs: each with the sigma of its noise at the sensor's own rate."""
+    warnings = [text for read in runs for text in run_warnings(read, reading.step)]
+    if file.time is None or file.time.kind != "sample":
+        warnings += length_warnings(runs, "s" if file.time is None else file.time.unit)
+    warnings += heading_warnings(file.channels, file.time)
+    for run in file.runs:
+        warnings += heading_warnings(*own_columns(reading.path, run, file.channels, file.time), run)
+    warnings += constant_warnings(runs)
+    for output, sensor_sigma in outputs:
+        warnings += quantum_warning(_of_fit(runs), output.name, sensor_sigma, output.unit)
+    return warnings + copy_warnings(runs) + common_warnings(runs)

@@ -31,7 +31,18 @@ def start(
     """
     zero = jnp.zeros_like(stress)
     detwinned = wire.kinetics.variants.detwinned_at_start(stress, fraction)
-    state = WireState(temperature, stress, strain, fraction, zero + 1.0, zero, zero, zero, detwinned + zero, zero)
+    state = WireState(
+        temperature=temperature,
+        stress=stress,
+        strain=strain,
+        martensite_fraction=fraction,
+        xi_M=zero + 1.0,
+        xi_A=zero,
+        heating_missed=zero,
+        cooling_missed=zero,
+        detwinned_fraction=detwinned + zero,
+        formed_by_loading=zero,
+    )
     state = dataclasses.replace(state, history=history_at_start(history, state))
     h = martensite_left(wire.kinetics, terms, temperature, stress, state)
     k = austenite_left(wire.kinetics, terms, temperature, stress, state)
