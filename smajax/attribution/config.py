@@ -1,6 +1,7 @@
-"""Thresholds of the attribution in one place, each with its reason.
+"""Thresholds of the verdict, of the checks and of the report, which a user may change, each with its reason.
 
-A number that only makes one numerical method work (the tolerance of a test for rank, say) stays in that method's module.
+A constant of one method (how many sets of effects a round fits, after how many steps a fit that is far behind ends) stands at
+the top of the module that uses it, with its reason.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class AttributionConfig:
-    """Every threshold of the search, its checks and its report. Shares are 0..1; nothing here has a unit."""
+    """What `close_loop(..., config=...)` changes. Shares are 0..1; nothing here has a unit."""
 
     # Is the residual noise?
     noise_excess: float = (

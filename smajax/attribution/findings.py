@@ -219,7 +219,7 @@ class Round:
     """One round of the search, or what a later stage took out of the model that it ended with."""
 
     number: int
-    tried: tuple[tuple[str, float], ...]  # what a later stage judged: ("latent_heat + radiation", leave-one-out rmse)
+    tried: tuple[tuple[str, float], ...]  # what a later stage compared: ("latent_heat + radiation", leave-one-out rmse)
     chosen: str  # the likeliest set, or what was taken out; "" where nothing changed
     reason: Reason
     removed: bool = False  # `chosen` was taken out

@@ -34,25 +34,25 @@ def grouped(sets: Iterable[Effects], compiled: Sequence[Effects]) -> list[tuple[
         if fitting:
             _add(groups, min(fitting, key=len), effects)
             continue
-        for place, (carried, members) in enumerate(groups):
-            union = carried | needed
-            if carried not in known and all(_cheap(frozenset(one), union) for one in (*members, effects)):
-                groups[place] = (union, [*members, effects])
+        for place, (program, its_sets) in enumerate(groups):
+            union = program | needed
+            if program not in known and all(_cheap(frozenset(one), union) for one in (*its_sets, effects)):
+                groups[place] = (union, [*its_sets, effects])
                 break
         else:
             groups.append((needed, [effects]))
     return groups
 
 
-def _add(groups: list[tuple[frozenset[str], list[Effects]]], carried: frozenset[str], effects: Effects) -> None:
-    for one, members in groups:
-        if one == carried:
-            members.append(effects)
+def _add(groups: list[tuple[frozenset[str], list[Effects]]], program: frozenset[str], effects: Effects) -> None:
+    for one, its_sets in groups:
+        if one == program:
+            its_sets.append(effects)
             return
-    groups.append((carried, [effects]))
+    groups.append((program, [effects]))
 
 
-def _cheap(needed: frozenset[str], carried: frozenset[str]) -> bool:
+def _cheap(needed: frozenset[str], program: frozenset[str]) -> bool:
     """Whether a set may be fitted in a program that carries so many more effects."""
-    more = carried - needed
+    more = program - needed
     return len(more) <= MOST_SHARED and not any(LIBRARY[effect].candidate.stick_slip for effect in more)

@@ -156,7 +156,7 @@ def _fits(setting: Search, host: Model, runs: Sequence[str]) -> list[tuple[_Even
     squares = float((left**2).sum()) / error**2
     allowed = (MOST_LEFT * float(own.noise_sigma) / error) ** 2 * float(np.asarray(own.batch.mask).sum())
     excess = tuple((steps, max(share * squares, allowed)) for steps, share in MOST_SHARES)
-    settings = replace(settings, allowed_excess=excess, least_cost=0.0, hopeless_excess=None, one_of_each=0)
+    settings = replace(settings, allowed_excess=excess, least_cost=0.0, promised_excess=None, one_of_each=0)
     fits = levenberg_marquardt(joint_problem, tasks, settings)
     return [
         (

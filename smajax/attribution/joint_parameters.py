@@ -115,13 +115,13 @@ class JointParameters:
         An effect that is off costs time in every step.
         """
         own = self.problem.system
-        carried = tuple(
+        fitted_ones = tuple(
             one for one in own.effects if one.effect_name in effects or one.effect_name not in self.coefficients
         )
         batch, sigma = self.problem.batch, self.problem.noise_sigma
         priors = self.prior_records(effects)
         problem = Problem.build(
-            dataclasses.replace(own, effects=carried), batch, sigma, self.problem.offset, priors=priors
+            dataclasses.replace(own, effects=fitted_ones), batch, sigma, self.problem.offset, priors=priors
         )
         return problem, np.asarray([self.slots[name] for name in problem.names])
 

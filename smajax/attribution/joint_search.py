@@ -41,7 +41,7 @@ ALLOWED_EXCESS = (
     (14, 100.0),
 )  # after so many steps fits end whose cost is so far above the least
 # Far behind by what is still to come: 15 nats, which no smaller number of parameters makes up for.
-HOPELESS_EXCESS = (4, 30.0)
+PROMISED_EXCESS = (4, 30.0)
 ONE_OF_EACH = 4  # steps, after which of the fits of one set from two places the better one alone goes on
 SETTLED = 0.05  # relative change of the error of a sample
 DETECTABLE = 1.0  # standard errors that an effect of one width has to change the runs by to be looked for
@@ -109,9 +109,9 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
 
     Fills `search.fitted` and `search.rounds`.
     """
-    for carried, members in _grouped(search, starts):
-        for effects in members:
-            search.fitted[effects] = fitted_model(search.joint, effects, starts[effects], carried)
+    for program, its_sets in _grouped(search, starts):
+        for effects in its_sets:
+            search.fitted[effects] = fitted_model(search.joint, effects, starts[effects], program)
     error = min(search.error(model) for model in search.fitted.values())
     # All to their end, however far behind: the base model is what every result is held against.
     _fit_side_by_side(search, list(starts.items()), error, "fitting what the search begins with", compared=False)
@@ -252,9 +252,9 @@ def _fit(
     """Fit the sets, all side by side, from the present values and from where the linear model points to."""
     joint = search.joint
     begun: list[tuple[tuple[str, ...], np.ndarray]] = []
-    for carried, members in _grouped(search, [_effects(search, subset) for subset in sets]):
-        problem, index = joint.restricted(carried)
-        here = [subset for subset in sets if _effects(search, subset) in members]
+    for program, its_sets in _grouped(search, [_effects(search, subset) for subset in sets]):
+        problem, index = joint.restricted(program)
+        here = [subset for subset in sets if _effects(search, subset) in its_sets]
         points = [starts(joint, subset, linear, traces) for subset in here]
         for subset, start in zip(here, nearest(problem.with_noise(error), points, index), strict=True):
             effects = _effects(search, subset)
@@ -282,10 +282,10 @@ def _fit_side_by_side(
     search.settings.progress(Stage(stage, 0.0))
     settings = comparison_settings(search.settings, stage)
     if not compared:
-        settings = dataclasses.replace(settings, allowed_excess=(), hopeless_excess=None)
+        settings = dataclasses.replace(settings, allowed_excess=(), promised_excess=None)
     groups = [
-        (carried, [one for one in begun if one[0] in members])
-        for carried, members in _grouped(search, [effects for effects, _ in begun])
+        (program, [one for one in begun if one[0] in its_sets])
+        for program, its_sets in _grouped(search, [effects for effects, _ in begun])
     ]
     least: dict[tuple[str, ...], EndedFit] = {}
     for fit in fits_by_program(joint, groups, error, settings):
@@ -294,7 +294,7 @@ def _fit_side_by_side(
             least[fit.effects] = fit
     for effects, fit in least.items():
         # Coefficients of other effects count for nothing in this model.
-        model = fitted_model(joint, effects, joint.without(fit.values, effects), fit.carried)
+        model = fitted_model(joint, effects, joint.without(fit.values, effects), fit.program)
         old = search.fitted.get(effects)
         if old is None or model.log_evidence(error**2) > old.log_evidence(error**2):
             search.fitted[effects] = model
@@ -304,7 +304,7 @@ class EndedFit(NamedTuple):
     """Of a set of effects, in the program that carries some."""
 
     effects: tuple[str, ...]
-    carried: tuple[str, ...]
+    program: tuple[str, ...]
     values: np.ndarray  # (P,)
     cost: float
 
@@ -320,8 +320,8 @@ def fits_by_program(
     Those of one program go side by side; the least cost so far ends what is far behind it in the next.
     """
     progress, least = settings.progress, settings.least_cost
-    for place, (carried, begun) in enumerate(groups):
-        problem, index = joint.restricted(carried)
+    for place, (program, begun) in enumerate(groups):
+        problem, index = joint.restricted(program)
         problem = problem.with_noise(error)
         tasks = [problem.task(joint.free(effects), joint.bounds, values[index]) for effects, values in begun]
         own = dataclasses.replace(settings, progress=part_of(progress, place, len(groups)), least_cost=least)
@@ -330,7 +330,7 @@ def fits_by_program(
         for (effects, start), fit in zip(begun, fits, strict=True):
             values = np.array(start)
             values[index] = fit.values
-            yield EndedFit(effects, carried, values, fit.cost)
+            yield EndedFit(effects, program, values, fit.cost)
 
 
 def _grouped(
@@ -338,10 +338,10 @@ def _grouped(
 ) -> list[tuple[tuple[str, ...], list[tuple[str, ...]]]]:
     """(effects that a program carries, sets that are fitted in it), and remember the programs."""
     found = []
-    for union, members in grouped(sets, search.programs):
-        carried = search.joint.ordered(tuple(union))
-        search.programs = tuple(dict.fromkeys([*search.programs, carried]))
-        found.append((carried, members))
+    for union, its_sets in grouped(sets, search.programs):
+        program = search.joint.ordered(tuple(union))
+        search.programs = tuple(dict.fromkeys([*search.programs, program]))
+        found.append((program, its_sets))
     return found
 
 
@@ -352,7 +352,7 @@ def comparison_settings(settings: FitSettings, stage: str) -> FitSettings:
         max_steps=STEPS,
         absolute_tolerance=SETTLED_COST,
         allowed_excess=ALLOWED_EXCESS,
-        hopeless_excess=HOPELESS_EXCESS,
+        promised_excess=PROMISED_EXCESS,
         one_of_each=ONE_OF_EACH,
         stage=stage,
     )

@@ -82,11 +82,11 @@ def decomposed(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def fitted_model(
-    joint: JointParameters, effects: tuple[str, ...], values: np.ndarray, carried: Sequence[str]
+    joint: JointParameters, effects: tuple[str, ...], values: np.ndarray, program: Sequence[str]
 ) -> FittedModel:
-    """`effects` at their fitted `values` (P,). `carried`: effects of the program that computes it, these among them."""
+    """`effects` at their fitted `values` (P,). `program`: effects of the program that computes it, these among them."""
     names = joint.free(effects)
-    problem, index = joint.restricted(carried)
+    problem, index = joint.restricted(program)
     residual, columns = residual_and_columns(problem, values[index], names)
     at = {name: float(values[joint.slots[name]]) for name in names}
     scales = np.asarray([joint.scale(name, at[name]) for name in names])

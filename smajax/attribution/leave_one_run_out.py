@@ -36,12 +36,12 @@ class LeftOut(NamedTuple):
     values: np.ndarray  # (parts, P), parameters of the problem whose joint fit it is, without each part of the runs
 
 
-def left_out(joint: JointParameters, model: FittedModel, error: float, carried: Sequence[str] | None = None) -> LeftOut:
+def left_out(joint: JointParameters, model: FittedModel, error: float, program: Sequence[str] | None = None) -> LeftOut:
     """Each run by the model without it.
 
-    `error`: of an independent sample, SI. `carried`: effects of the program that computes it; None: the model's own.
+    `error`: of an independent sample, SI. `program`: effects of the program that computes it; None: the model's own.
     """
-    problem, index = joint.restricted(model.effects if carried is None else carried)
+    problem, index = joint.restricted(model.effects if program is None else program)
     problem = problem.with_noise(error)
     values = model.values[index]
     runs = problem.batch.runs
@@ -66,10 +66,10 @@ def left_out(joint: JointParameters, model: FittedModel, error: float, carried: 
 
 
 def predicting(
-    joint: JointParameters, fitted: FittedModel, error: float, noise: float, carried: Sequence[str] | None = None
+    joint: JointParameters, fitted: FittedModel, error: float, noise: float, program: Sequence[str] | None = None
 ) -> Model:
     """A fitted model with its error on each run by the others; `noise` of a sample, SI, the rest as of `left_out`."""
-    found = left_out(joint, fitted, error, carried)
+    found = left_out(joint, fitted, error, program)
     rmse = float(np.sqrt((found.misfit**2).sum() / np.asarray(joint.problem.batch.mask).sum()))
     return Model(fitted.effects, fitted.values, fitted.squares / noise**2, found.misfit, rmse, found.values)
 

@@ -55,8 +55,8 @@ def _on_held_out(
         return {}
     simpler = [_without_one(search, one) for one in models]
     values = [base.values, *(one.values for one in models), *(one.values for one in simpler if one is not None)]
-    carried = [effect for one in models for effect in one.effects]
-    basic, *others = setting.held_out_residuals(carried, values)
+    every = [effect for one in models for effect in one.effects]
+    basic, *others = setting.held_out_residuals(every, values)
     own, nested = others[: len(models)], iter(others[len(models) :])
     found = {}
     for one, rest, mine in zip(models, simpler, own, strict=True):

@@ -162,8 +162,8 @@ def learnt(setting: Search, fits: TermFits) -> Lacking:
     error = least_error(setting, [fits.none, *fitted])
     noise = float(search.problem.noise_sigma)
     programs = _programs(fits.joint, fits.none.effects, [model.effects[-1] for model in fitted])
-    carried = {term: own for own, terms in programs for term in terms}
-    present = predicting(fits.joint, fits.none, error, noise, next(iter(carried.values())))
+    program_of = {term: own for own, terms in programs for term in terms}
+    present = predicting(fits.joint, fits.none, error, noise, next(iter(program_of.values())))
     log_odds = [fits.log_odds(one, error) for one in fitted]
     likeliest = fitted[0]
     alike = [
@@ -173,7 +173,7 @@ def learnt(setting: Search, fits: TermFits) -> Lacking:
     ]
     # The runs are left out of what is named, or may be in its place: refits take as long as the fits.
     predict = {
-        model.effects[-1]: predicting(fits.joint, model, error, noise, carried[model.effects[-1]]).left_out_rmse
+        model.effects[-1]: predicting(fits.joint, model, error, noise, program_of[model.effects[-1]]).left_out_rmse
         for model in fitted
         if model is likeliest or model.effects[-1] in alike
     }
@@ -274,12 +274,12 @@ def fitted_terms(
     """Every term fitted together with the parameters of the model with `effects`, from the best of its places."""
     settings = comparison_settings(FitSettings(cache=search.cache, progress=search.progress), "fitting unknown terms")
     groups = []
-    for carried, terms in _programs(joint, effects, list(places)):
-        problem, index = joint.restricted(carried)
+    for program, terms in _programs(joint, effects, list(places)):
+        problem, index = joint.restricted(program)
         begun = nearest(problem.with_noise(error), [places[term] for term in terms], index)
-        groups.append((carried, [((*effects, term), at) for term, at in zip(terms, begun, strict=True)]))
+        groups.append((program, [((*effects, term), at) for term, at in zip(terms, begun, strict=True)]))
     fits = fits_by_program(joint, groups, error, settings)
-    return [fitted_model(joint, own, values, carried) for own, carried, values, _ in fits]
+    return [fitted_model(joint, own, values, program) for own, program, values, _ in fits]
 
 
 def _programs(

@@ -145,7 +145,7 @@ class PlantOptions:
     def _made(self, limit: float | None, limited: bool) -> tuple[System, str]:
         """(the plant; a sentence on its limit, or "")."""
         from smajax.control.compose import compose, with_values
-        from smajax.control.kept_plant import gives_limit, plant_of, with_limit
+        from smajax.control.model_as_plant import gives_limit, plant_of, with_limit
         from smajax.model.rigs import arm
 
         named = {"--wire": self.wire, "--load": self.load, "--drive": self.drive}
@@ -171,14 +171,14 @@ class PlantOptions:
     @property
     def gives_limit(self) -> bool:
         """Whether --set has the limit of the command."""
-        from smajax.control.kept_plant import gives_limit
+        from smajax.control.model_as_plant import gives_limit
 
         return gives_limit(self._changed)
 
     def noise(self, text: str, unit: PositionUnit) -> tuple[float, str]:
         """(noise of the readings in the unit shown: that of --noise, else that of the model's file, else none; a sentence on the second)."""
         from smajax.cli.loop_options import noise_option
-        from smajax.control.kept_plant import noise_of_file
+        from smajax.control.model_as_plant import noise_of_file
 
         typed = noise_option(text, unit)
         if typed is not None:
@@ -209,7 +209,7 @@ class LoopPlants(PlantOptions):
             raise typer.BadParameter(
                 "is one plant in the place of drawn ones and of mismatches: give one of these.", param_hint="--plant"
             )
-        from smajax.control.kept_plant import one_plant
+        from smajax.control.model_as_plant import one_plant
 
         with refused("--plant"):
             return one_plant(loaded(self.plant), self.system(limit, said=False))
@@ -235,7 +235,7 @@ class LoopPlants(PlantOptions):
             return None
         import numpy as np
 
-        from smajax.control.kept_plant import with_limit, within_limit
+        from smajax.control.model_as_plant import with_limit, within_limit
         from smajax.core.parameters import parameter_values, parameters, set_parameters
 
         plants = self.kept.plants(wanted, seed)

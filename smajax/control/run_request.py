@@ -21,9 +21,9 @@ from smajax.control.compose import compose, with_values
 from smajax.control.figures_of_merit import SetPointMerit, merit_by_set_point, set_point_spans
 from smajax.control.gains_file import Gains, read_gains
 from smajax.control.interface import between_in_words, check_interface, check_set_points, interface_of, noise_of
-from smajax.control.kept_plant import gives_limit, noise_of_file, plant_of, true_plant, with_limit
 from smajax.control.loop_dataset import labelled_loop
 from smajax.control.loop_settings import LoopInUse, LoopSettings, joined, sentences, settings_of
+from smajax.control.model_as_plant import gives_limit, noise_of_file, plant_of, true_plant, with_limit
 from smajax.control.position_unit import PositionUnit, unit_of
 from smajax.control.presets import CONTROLLERS, check_controller
 from smajax.control.reach import reach_of, reach_sentence

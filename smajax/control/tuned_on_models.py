@@ -1,4 +1,4 @@
-"""What a missing effect is worth in control: a controller tuned on each of several models, and judged on one plant."""
+"""What a missing effect is worth in control: a controller tuned on each of several models, and evaluated on one plant."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from smajax.control.closed_loop import ClosedLoopSetup
 from smajax.control.compiled_loop import measured_loop
 from smajax.control.controllers.base import AbstractController
 from smajax.control.gains_file import Gains, fixed_parameters
-from smajax.control.kept_plant import plant_of, within_limit
+from smajax.control.model_as_plant import plant_of, within_limit
 from smajax.control.position_unit import PositionUnit, unit_of
 from smajax.control.presets import CONTROLLERS
 from smajax.control.reach import reach_of, reach_sentence, shared_set_points
@@ -34,7 +34,7 @@ QUICK = {"tried": 8, "starts": 2, "rounds": 5, "finish": 10, "unseen": 2}  # for
 
 
 @dataclass(frozen=True)
-class JudgedLoop:
+class EvaluatedLoop:
     """One closed loop on the plant, a step from the start, cold and at rest; SI."""
 
     set_point: float  # rad or m
@@ -52,7 +52,7 @@ class TunedOnModel:
     model: str  # "base model"
     gains: Gains
     units: Mapping[str, str]
-    loops: tuple[JudgedLoop, ...]
+    loops: tuple[EvaluatedLoop, ...]
 
     @property
     def settling_time(self) -> float:
@@ -67,7 +67,7 @@ class TunedOnModel:
 
 @dataclass(frozen=True)
 class ControlComparison:
-    """Gains tuned on several models, judged on one plant."""
+    """Gains tuned on several models, evaluated on one plant."""
 
     controller: str
     plant: str  # what it is, in words: "true model"
@@ -90,7 +90,7 @@ def tuned_on_models(
     weights: Mapping[str, float] | None = None,
     progress: Progress = quiet,
 ) -> ControlComparison:
-    """`controller` tuned on each of the `models` and on plants from its posterior, and judged on the `plant`, each by its name.
+    """`controller` tuned on each of the `models` and on plants from its posterior, and evaluated on the `plant`, each by its name.
 
     The first model's load has the unit of the set points, mm or deg; by default they are spread over what all the models reach. All
     have the first model's limit of the command, its bounds of the gains and its controller's parameters that are not tuned (filter,
@@ -124,7 +124,7 @@ def tuned_on_models(
     for name, assumed, plants, settings, found in searched:
         gains = replace(found.after, values=best_gains(assumed, settings, pool, plants=plants))
         own = gains.put(CONTROLLERS[controller].plant(assumed))
-        loops = tuple(judged(truth, own, float(target), seconds) for target in unit.to_own(np.asarray(targets)))
+        loops = tuple(loop_on_plant(truth, own, float(target), seconds) for target in unit.to_own(np.asarray(targets)))
         tuned.append(TunedOnModel(name, gains, found.units, loops))
     return ControlComparison(controller, plant[0], unit, seconds, tuple(tuned), differing(first, plant[1]))
 
@@ -147,11 +147,11 @@ def differing(model: ModelRecord, plant: ModelRecord) -> tuple[str, ...]:
     )
 
 
-def judged(plant: System, controller: AbstractController, set_point: float, seconds: float) -> JudgedLoop:
+def loop_on_plant(plant: System, controller: AbstractController, set_point: float, seconds: float) -> EvaluatedLoop:
     """The loop of a controller on a plant, from the start to one set point (rad or m)."""
     reference = resting(jnp.full(round(seconds / STEP) + 1, set_point))
     loop, figures, _ = measured_loop(ClosedLoopSetup(plant, controller, reference, STEP, 1))
-    return JudgedLoop(
+    return EvaluatedLoop(
         set_point,
         np.asarray(loop.run.time),
         np.asarray(loop.run.position),

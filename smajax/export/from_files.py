@@ -6,9 +6,9 @@ import math
 from pathlib import Path
 
 from smajax.control.gains_file import read_gains
-from smajax.control.kept_plant import with_limit
 from smajax.control.loop_around import loop_around
 from smajax.control.loop_settings import LoopSettings, joined
+from smajax.control.model_as_plant import with_limit
 from smajax.control.presets import CONTROLLERS
 from smajax.export.controller import SHORT, check_reads, controller_block
 from smajax.export.errors import ExportError

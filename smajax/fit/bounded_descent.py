@@ -1,6 +1,6 @@
 """Levenberg-Marquardt within bounds, as a descent and a search of optimistix (Rader, Lyons and Kidger 2024).
 
-optimistix divides a least-sums_of_squares method into a descent (which step, for a step size) and a search (accept or reject a
+optimistix divides a least-squares method into a descent (which step, for a step size) and a search (accept or reject a
 step, and the next step size). Its own `DampedNewtonDescent` knows no bounds. `BoundedDampedNewtonDescent` minimises the
 same damped quadratic model within the bounds, exactly; `GainRatioSearch` is the trust region of Nielsen (1999). Both
 take normal equations (`FunctionInfo.EvalGradHessian`, f = r^T r / 2) as well as residual and Jacobian
@@ -8,7 +8,8 @@ take normal equations (`FunctionInfo.EvalGradHessian`, f = r^T r / 2) as well as
 them step by step because its residuals are machine code outside JAX.
 
 Bounds on the step, and not a map of the bounded interval onto the whole line: on such a map a bound is infinitely far
-away and a narrow valley bends, and a fit that takes 20 steps here took 150 there (`studies/coverage`).
+away, and correlated parameters change at the same cost along a curve instead of a line. A fit that takes 20 steps here took
+150 there (`studies/coverage`).
 """
 
 from __future__ import annotations

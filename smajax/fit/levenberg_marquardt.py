@@ -71,7 +71,7 @@ class FitSettings:
 
     A fit ends where a step lowers its cost by less than `tolerance` of it, or by less than `absolute_tolerance`, and
     predicted no more. Of `allowed_excess`, (steps, cost) each: after so many steps a fit ends whose cost is above the least
-    of all by more than that; `least_cost` is that of fits that have ended elsewhere. `hopeless_excess`, (steps, cost): the same of
+    of all by more than that; `least_cost` is that of fits that have ended elsewhere. `promised_excess`, (steps, cost): the same of
     what a fit is still to come to, by twice the decrease that its derivatives promise. `one_of_each`: after so many steps one fit alone goes on, the best, of those that
     free the same parameters; 0: all do.
     """
@@ -81,7 +81,7 @@ class FitSettings:
     absolute_tolerance: float = 0.0
     allowed_excess: tuple[tuple[int, float], ...] = ()
     least_cost: float = float("inf")
-    hopeless_excess: tuple[int, float] | None = None
+    promised_excess: tuple[int, float] | None = None
     one_of_each: int = 0
     cache: ResultCache = field(default_factory=ResultCache)
     progress: Progress = quiet
@@ -261,7 +261,7 @@ def levenberg_marquardt(
     def running() -> list[int]:
         return [k for k, state in enumerate(states) if state.status == Status.RUNNING]
 
-    limits = settings.allowed_excess, settings.least_cost, settings.hopeless_excess, settings.one_of_each
+    limits = settings.allowed_excess, settings.least_cost, settings.promised_excess, settings.one_of_each
     settled = settings.max_steps, settings.tolerance, settings.absolute_tolerance, *limits
     key = cache.key((problem, list(tasks)), "levenberg_marquardt", outputs if outputs is not None else "", *settled)
     cached = cache.load(key)
@@ -308,12 +308,12 @@ def _without_exceeding(states: Sequence[LMState], steps: int, settings: FitSetti
     """Fits end that after these steps are too far above the least cost, or promise to stay so."""
     excess = min((0.5 * most for after, most in settings.allowed_excess if steps >= after), default=np.inf)
     least = min(min((float(state.f) for state in states), default=np.inf), 0.5 * settings.least_cost)
-    after, most = settings.hopeless_excess or (0, np.inf)
-    hopeless = 0.5 * most if steps >= after else np.inf
+    after, most = settings.promised_excess or (0, np.inf)
+    ahead = 0.5 * most if steps >= after else np.inf
 
     def exceeds(state: LMState) -> bool:
         above = float(state.f) - least
-        return above > excess or (above > hopeless and above - TWICE * float(_promised(state.descent)) > hopeless)
+        return above > excess or (above > ahead and above - TWICE * float(_promised(state.descent)) > ahead)
 
     return [_ended_as_exceeded(one) if one.status == Status.RUNNING and exceeds(one) else one for one in states]
 

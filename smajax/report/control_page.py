@@ -1,4 +1,4 @@
-"""Gains tuned on several models and judged on one plant: sentences, a table, a picture, JSON, a page, and a file of gains."""
+"""Gains tuned on several models and evaluated on one plant: sentences, a table, a picture, JSON, a page, and a file of gains."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def conclusions(result: ControlComparison) -> list[str]:
         )
     if len(result.tuned) > 1 and result.plant == result.tuned[-1].model:
         sentences.append(
-            f"Mind: the {result.plant} is the plant as well, and the gains tuned on it are judged on the model that they were tuned on. This is what they are "
+            f"Mind: the {result.plant} is the plant as well, and the gains tuned on it are evaluated on the model that they were tuned on. This is what they are "
             "worth if that model is true."
         )
     return [*sentences, worth(result)] if len(result.tuned) > 1 else sentences

@@ -1,1 +1,1 @@
-"""How large the package is and how its imports run, counted the same way of any version of it."""
+"""The counts of a package in a checkout, from its files alone."""

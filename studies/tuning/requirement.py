@@ -29,7 +29,7 @@ from studies.tuning.record import HERE
 LIMITS = {"settling_time": 4.0, "overshoot": 2.0, "steady_error": 0.5}
 MARGIN = 0.95  # of the limits, to which gains are tuned: between the set points tuned loops are a little worse
 ADDED, APART = 6, 3.0  # set points that a pass adds, and degrees between them
-HOPELESS = 5.0  # a limit exceeded by so many times itself is not tried again
+NOT_TRIED_AGAIN = 5.0  # a limit exceeded by so many times itself is not tried again
 VARIATION = {"inertia": 0.2, "damping": 0.2, "convection": 0.2}
 FINER = 1e-3  # s: a step at which the worst loops are evaluated again
 SEED = 20261122  # of the loops that are drawn
@@ -159,7 +159,7 @@ def _passes(system: System, controller: str, plan: Plan, progress: Progress) -> 
         progress(Message(f"{controller}: pass {number + 1} exceeds the margin by {worst:.3f}"))
         if best is None or worst < least:
             best, least = result, worst
-        if worst <= 0.0 or worst > HOPELESS:
+        if worst <= 0.0 or worst > NOT_TRIED_AGAIN:
             break
         settings = dataclasses.replace(
             settings,

@@ -157,7 +157,7 @@ def test_fits_of_an_effect_with_several_minima_start_all_over_its_ranges(effect:
 
 
 def test_starts_of_a_stribeck_friction_cover_its_sizes_and_speeds() -> None:
-    """Jumps make valleys; where nothing is known of the size there is none to begin from."""
+    """Jumps make local minima; where nothing is known of the size no start is likelier than another."""
     candidate = LIBRARY["stribeck_friction"].candidate
     ranges = candidate.start_ranges({"limit": 0.05})
     places = logarithmic_points(ranges, PLACES)

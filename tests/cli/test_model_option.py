@@ -12,7 +12,7 @@ import xarray as xr
 
 import smajax as sma
 from smajax.cli.plant_options import LoopPlants
-from smajax.control.kept_plant import plant_of
+from smajax.control.model_as_plant import plant_of
 from smajax.control.tune.scenarios import held_out, tuned_on
 from smajax.control.tune.settings import settings_for
 from smajax.data.model_file.actuator_model import ActuatorModel

@@ -10,7 +10,7 @@ import pytest
 
 import smajax as sma
 from smajax.control.gains_file import Gains, fixed_parameters
-from smajax.control.kept_plant import with_limit, within_limit
+from smajax.control.model_as_plant import with_limit, within_limit
 from smajax.control.presets import CONTROLLERS
 from smajax.control.reach import out_of_reach, reach_of, shared_set_points
 from smajax.control.tune.settings import TuneSettings, settings_for

@@ -145,7 +145,7 @@ def test_fits_far_above_the_best_end_after_as_many_steps_as_allowed() -> None:
 def test_a_fit_ends_that_promises_to_stay_far_above_the_best() -> None:
     """By the least value of its quadratic model: cost 200 with a column that takes off 10, or 190, of it."""
     best = _advanced(_initial_state(_task(np.full(1, 0.5)), 8), (10.0, np.zeros(1), np.eye(1)), TOLERANCES)
-    settings = FitSettings(hopeless_excess=(4, 50.0))
+    settings = FitSettings(promised_excess=(4, 50.0))
     for decrease, steps, expected in (
         (10.0, 4, Status.EXCEEDED),
         (10.0, 3, Status.RUNNING),

@@ -1,4 +1,4 @@
-"""Gains tuned on two models and judged on one plant: what is said of them, and what is written."""
+"""Gains tuned on two models and evaluated on one plant: what is said of them, and what is written."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pytest
 import smajax as sma
 from smajax.control.gains_file import Gains, read_gains
 from smajax.control.position_unit import PositionUnit
-from smajax.control.tuned_on_models import ControlComparison, JudgedLoop, TunedOnModel, differing
+from smajax.control.tuned_on_models import ControlComparison, EvaluatedLoop, TunedOnModel, differing
 from smajax.report.control_page import conclusions, rows, worth, write_comparison
 from tests.fit.test_predict import kept_model
 
@@ -21,9 +21,9 @@ GAINS = {"proportional_gain": 900.0, "integral_gain": 300.0, "derivative_gain": 
 UNITS = {"proportional_gain": "V/m", "integral_gain": "V/(m s)", "derivative_gain": "V s/m", "unwinding_time": "s"}
 
 
-def loop(set_point: float, settling_time: float, overshoot: float = 0.0) -> JudgedLoop:
+def loop(set_point: float, settling_time: float, overshoot: float = 0.0) -> EvaluatedLoop:
     time = np.linspace(0.0, 10.0, 50)
-    return JudgedLoop(set_point, time, set_point * (1.0 - np.exp(-time)), settling_time, overshoot, 1e-14)
+    return EvaluatedLoop(set_point, time, set_point * (1.0 - np.exp(-time)), settling_time, overshoot, 1e-14)
 
 
 def compared(*settling: tuple[float, float], differs: tuple[str, ...] = ()) -> ControlComparison:
@@ -50,10 +50,10 @@ def test_what_the_found_model_is_worth_is_said(settling: tuple[tuple[float, floa
     assert worth(compared(*settling)) == f"Tuning on the extended model in the place of the base model {said}"
 
 
-def test_gains_that_are_judged_on_the_model_that_they_were_tuned_on_are_said_to_be() -> None:
+def test_gains_that_are_evaluated_on_the_model_that_they_were_tuned_on_are_said_to_be() -> None:
     result = dataclasses.replace(compared((4.0, 6.0), (3.0, 5.0)), plant="extended model")
-    assert any("judged on the model that they were tuned on" in one for one in conclusions(result))
-    assert not any("judged on the model" in one for one in conclusions(compared((4.0, 6.0), (3.0, 5.0))))
+    assert any("evaluated on the model that they were tuned on" in one for one in conclusions(result))
+    assert not any("evaluated on the model" in one for one in conclusions(compared((4.0, 6.0), (3.0, 5.0))))
 
 
 def test_a_loop_that_never_settles_and_a_rounding_error_are_said_as_such() -> None:

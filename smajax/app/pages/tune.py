@@ -21,7 +21,7 @@ from smajax.core.display_units import digits
 def _able(at: tuple[str, int, int]) -> tuple[tuple[str, ...], str, str]:
     """(controllers that this model can have, the unit of set points, why there are none)."""
     ready()
-    from smajax.control.kept_plant import plant_of
+    from smajax.control.model_as_plant import plant_of
     from smajax.control.position_unit import default_set_points, unit_of
     from smajax.control.presets import controllers_for
     from smajax.data.experiment.errors import ExperimentError

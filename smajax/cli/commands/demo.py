@@ -34,7 +34,7 @@ def demo(
 
     The data of each bench are from an independent simulator. Its true effects are in truth.toml, which `close-loop` does
     not read and which is printed after each verdict. In the end a controller with a model and one without are tuned on the fitted models of
-    `latent` and judged on its true wire.
+    `latent` and evaluated on its true wire.
 
     Example:  smajax demo --only latent --out demo-report
     """
@@ -63,7 +63,8 @@ def demo(
                     typer.echo(f"  {line}")
             if control and (folder / TRUE_MODEL).is_file():
                 typer.echo(
-                    "\nControllers tuned on what was found, and on the base model, judged on the true wire:", err=True
+                    "\nControllers tuned on what was found, and on the base model, evaluated on the true wire:",
+                    err=True,
                 )
                 for controller in CONTROLLERS:
                     shown = tune_on_models(

@@ -1,4 +1,4 @@
-"""A whole tuning: settings -> starts -> rounds -> gains, judged before and after on what was tuned on and on what was not."""
+"""A whole tuning: settings -> starts -> rounds -> gains, evaluated before and after on what was tuned on and on what was not."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A kept model as the plant of closed loops, whose commands stay within those that it was fitted to."""
+"""A saved model as the plant of closed loops, whose commands stay within those that it was fitted to."""
 
 from __future__ import annotations
 
