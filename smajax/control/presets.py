@@ -313,6 +313,7 @@ CONTROLLERS: dict[str, ControllerPreset] = resolved(
         "backstepping1_integral": "smajax.control.controllers.backstepping_integral:ONE",
         "backstepping2_integral": "smajax.control.controllers.backstepping_integral:TWO",
         "feedforward_pi": "smajax.control.controllers.feedforward_pi:PRESET",
+        "receding_horizon": "smajax.control.controllers.receding_horizon:PRESET",
     }
 )
 OF_THE_SOURCE = ("pid", "vsc1", "vsc2", "vsc3", "nvsc", "sld", "backstepping1", "backstepping2")  # chapter 4's eight

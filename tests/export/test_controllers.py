@@ -78,6 +78,7 @@ OTHERS = [
     *((name, None, 0) for name in ("vsc1", "vsc2")),
     *((name, "model", 0) for name in ("pid", "nvsc", "sld", "backstepping1")),
     ("sld", "adaptive", 1),
+    ("receding_horizon", "model", 1),
     *((name, "printed", 0) for name in ("nvsc", "backstepping1", "backstepping2")),
 ]
 
