@@ -100,8 +100,8 @@ def improved(plan: Plan, normal: Normal, damping: Scalar) -> Plan:
         # Those that are held have an equation of their own: no change.
         reduced = matrix * free[:, None] * free[None, :] + jnp.diag(1.0 - free)
         right = free * (downhill - matrix @ (new - plan))
-        rows = [[reduced[i, j] for j in range(size)] for i in range(size)]
-        change = jnp.stack(solved(rows, [right[i] for i in range(size)]))
+        rows = [list(jnp.unstack(row)) for row in jnp.unstack(reduced)]
+        change = jnp.stack(solved(rows, list(jnp.unstack(right))))
         limit = jnp.where(change > 0.0, 1.0, LEAST)
         moves = change != 0.0
         share = jnp.where(moves, (limit - new) / jnp.where(moves, change, 1.0), jnp.inf)
@@ -168,7 +168,8 @@ class RecedingHorizon(AbstractController):
 
         def advance(carry: tuple[State, State, Normal], now: tuple[Scalar, Scalar, Plan]) -> tuple[Any, None]:
             state, along, normal = carry
-            share, time, moves = now
+            share, number, moves = now
+            time = number * dt
             after, along = self._advanced(state, along, share, moves, air, dt)
             goal = wanted.position + time * (wanted.velocity + 0.5 * time * wanted.acceleration)
             error = after.motion.position - goal
@@ -179,14 +180,18 @@ class RecedingHorizon(AbstractController):
         # Along each share of the plan the derivative of the state, one below the other.
         still = jax.tree.map(lambda leaf: jnp.zeros((pieces, *jnp.shape(leaf)), leaf.dtype), state)
         nothing = Normal(0.0 * one, 0.0 * plan)
-        rows = [jnp.repeat(each, self.steps, axis=0, total_repeat_length=count) for each in (plan, one)]
-        times = dt * jnp.arange(1, count + 1)
-        (end, along, normal), _ = lax.scan(advance, (state, still, nothing), (rows[0], times, rows[1]))
+        # Broadcast, since the derivative of a repetition is a lookup that machine code has not.
+        shares = jnp.reshape(jnp.broadcast_to(plan[:, None], (pieces, self.steps)), (count,))
+        moved_by = jnp.reshape(jnp.broadcast_to(one[:, None, :], (pieces, self.steps, pieces)), (count, pieces))
+        numbers = 1.0 * jnp.arange(1, count + 1)
+        (end, along, normal), _ = lax.scan(advance, (state, still, nothing), (shares, numbers, moved_by))
         over = end.motion.velocity - wanted.velocity - count * dt * wanted.acceleration
         normal = normal.with_residual(self.velocity_time * over, self.velocity_time * along.motion.velocity)
-        for j in range(pieces):
-            before, moves = (held, one[j]) if j == 0 else (plan[j - 1], one[j] - one[j - 1])
-            normal = normal.with_residual(self.change_weight * (plan[j] - before), self.change_weight * moves)
+        before, moves_before = held, 0.0 * plan
+        for share, moves in zip(jnp.unstack(plan), jnp.unstack(one), strict=True):
+            change = self.change_weight * (share - before)
+            normal = normal.with_residual(change, self.change_weight * (moves - moves_before))
+            before, moves_before = share, moves
         return normal
 
     def _advanced(
