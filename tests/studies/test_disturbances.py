@@ -25,7 +25,7 @@ HOLDING = ("backstepping1_integral", "feedforward_pi", "nvsc", "vsc3")  # back a
 
 
 def test_the_tables_and_pictures_are_of_the_stored_numbers() -> None:
-    assert set(RESULTS["controllers"]) == set(CONTROLLERS)
+    assert set(RESULTS["controllers"]) == set(CONTROLLERS) - {"receding_horizon"}  # which came later, as the page says
     np.testing.assert_allclose(RESULTS["plants"], plants())
     for name in EVERY:
         assert PAGE.split(f"<!-- {name} -->")[1].strip() == table(RESULTS, name)
