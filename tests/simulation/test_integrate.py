@@ -116,7 +116,7 @@ def test_a_control_acts_once_a_period_and_holds(every: int) -> None:
 
 
 def test_only_integrate_marches_in_time() -> None:
-    """Scans of these rooms: `integrate`, the stages of one step, the delay of input series, and a curve over temperature."""
+    """Loops of these rooms: `integrate`, the stages of one step, the delay of input series, a curve over temperature, and the rounds of a bounded least squares."""
     root = Path(smajax.__file__).parent
     scanning = {
         path.relative_to(root).as_posix()
@@ -129,4 +129,5 @@ def test_only_integrate_marches_in_time() -> None:
         "simulation/step.py",
         "simulation/input_delay.py",
         "control/controllers/quasi_static.py",
+        "control/controllers/receding_horizon.py",
     }

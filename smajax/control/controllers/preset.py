@@ -11,6 +11,7 @@ from smajax.control.controllers.base import AbstractController
 from smajax.control.load_equation import missing_for_equation, missing_for_stroke
 from smajax.control.scales import factors_for, is_arm, scaled
 from smajax.core.parameters import parameters, set_parameters
+from smajax.engine import Engine
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System
 from smajax.model.types import Scalar
@@ -49,6 +50,8 @@ class ControllerPreset:
     scales: Mapping[str, Sequence[Mapping[str, int]]] = field(default_factory=dict)
     # Parameters that do not follow the plant's scales, SI: of a comparison in which several models share them.
     fixed: Mapping[str, float] = field(default_factory=dict)
+    # What runs the derivatives of its loops in its gains: XLA where machine code has no translation of them, so that nobody is warned.
+    derivatives_by: Engine = "auto"
 
     def missing(self, system: System) -> str:
         """What it needs and this plant does not give, in words; "" where it can be made."""

@@ -20,7 +20,7 @@ or supply. I follows what error is left: dI/dt = (x_d - x)/T_i, the error within
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -40,6 +40,7 @@ from smajax.model.system import System, initial_state
 from smajax.model.types import Scalar, State
 from smajax.model.wire.two_populations import moved
 from smajax.simulation.input_delay import refuse_lag
+from smajax.simulation.integrate import Carry, Schedule, integrate
 from smajax.simulation.step import step
 
 Plan = Float[Array, " pieces"]
@@ -166,8 +167,8 @@ class RecedingHorizon(AbstractController):
         pieces, count, dt = self.pieces, self.pieces * self.steps, self.piece_time / self.steps
         one = jnp.eye(pieces, dtype=plan.dtype)
 
-        def advance(carry: tuple[State, State, Normal], now: tuple[Scalar, Scalar, Plan]) -> tuple[Any, None]:
-            state, along, normal = carry
+        def advance(carry: Carry, now: tuple[Scalar, Scalar, Plan]) -> Carry:
+            state, along, normal = carry.state
             share, number, moves = now
             time = number * dt
             after, along = self._advanced(state, along, share, moves, air, dt)
@@ -175,7 +176,7 @@ class RecedingHorizon(AbstractController):
             error = after.motion.position - goal
             beyond = error * (after.motion.velocity - wanted.velocity) > 0.0
             weight = jnp.where(beyond, self.beyond_weight, 1.0) / count**0.5
-            return (after, along, normal.with_residual(weight * error, weight * along.motion.position)), None
+            return Carry((after, along, normal.with_residual(weight * error, weight * along.motion.position)))
 
         # Along each share of the plan the derivative of the state, one below the other.
         still = jax.tree.map(lambda leaf: jnp.zeros((pieces, *jnp.shape(leaf)), leaf.dtype), state)
@@ -184,7 +185,9 @@ class RecedingHorizon(AbstractController):
         shares = jnp.reshape(jnp.broadcast_to(plan[:, None], (pieces, self.steps)), (count,))
         moved_by = jnp.reshape(jnp.broadcast_to(one[:, None, :], (pieces, self.steps, pieces)), (count, pieces))
         numbers = 1.0 * jnp.arange(1, count + 1)
-        (end, along, normal), _ = lax.scan(advance, (state, still, nothing), (shares, numbers, moved_by))
+        start = Carry((state, still, nothing))
+        march = integrate(advance, start, (shares, numbers, moved_by), Schedule(count))
+        end, along, normal = march.end.state
         over = end.motion.velocity - wanted.velocity - count * dt * wanted.acceleration
         normal = normal.with_residual(self.velocity_time * over, self.velocity_time * along.motion.velocity)
         before, moves_before = held, 0.0 * plan
@@ -262,4 +265,6 @@ BOX: Box = {
     "integral_band": (0.001, 0.1),
     "air_gain": (0.01, 50.0),
 }
-PRESET = ControllerPreset(receding_horizon, "change_weight", STATE, BOX, needs=EQUATION, known=frozenset({"believed"}))
+PRESET = ControllerPreset(
+    receding_horizon, "change_weight", STATE, BOX, needs=EQUATION, known=frozenset({"believed"}), derivatives_by="xla"
+)

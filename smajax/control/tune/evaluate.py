@@ -196,6 +196,7 @@ class TuningProblem:
             smoothed=self.preset.smoothed if smooth else None,
         )
         count, size = len(points), scenarios.size
+        engine = self.preset.derivatives_by if smooth else "auto"
         columns = {f"at {name}": np.repeat(points[:, k], size) for k, name in enumerate(self.names)}
         columns |= dict(zip((*self.plants.columns, TARGET), np.tile(scenarios.rows, (count, 1)).T, strict=True))
         columns[NUMBER] = np.tile(np.arange(size, dtype=float), count)
@@ -204,7 +205,7 @@ class TuningProblem:
             # Batches of one size, the last one filled up: one program serves however many starts are left.
             some = np.minimum(np.arange(start, start + self.loops), count * size - 1)
             axes = zipped({name: values[some] for name, values in columns.items()})
-            result += [answer for _, answer in chunks(function, problem, axes, self.loops, [0])]
+            result += [answer for _, answer in chunks(function, problem, axes, self.loops, [0], engine=engine)]
         whole = jax.tree.map(lambda *leaves: np.concatenate(leaves)[: count * size], *result)
         self.simulations += count * size
         by_candidate = jax.tree.map(lambda leaf: leaf.reshape(count, size, *leaf.shape[1:]), whole)
