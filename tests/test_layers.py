@@ -9,6 +9,8 @@ from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
+from studies.structure.imports import Graph, Package, modules_in
+
 PACKAGE = Path(__file__).parents[1] / "smajax"
 ORDER = [
     "core",
@@ -33,24 +35,7 @@ EXCEPTIONS = {
     ): "findings.summary and its like are smajax.report.narrate(findings) now; until version 0.3",
 }
 
-FILES = {".".join(p.relative_to(PACKAGE.parent).with_suffix("").parts): p for p in PACKAGE.rglob("*.py")}
-MODULES = {name.removesuffix(".__init__"): path for name, path in FILES.items()}
-
-
-def imported(module: str) -> Iterator[str]:
-    """Modules of the package that `module` imports: anywhere in its file, so within `if TYPE_CHECKING` and functions too."""
-    package = module if MODULES[module].name == "__init__.py" else module.rpartition(".")[0]
-    for node in ast.walk(ast.parse(MODULES[module].read_text("utf-8"))):
-        if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
-            levels = package.split(".")
-            above = ".".join(levels[: len(levels) - node.level + 1]) if node.level else ""
-            source = ".".join(part for part in (above, node.module) if part)
-            names = [f"{source}.{a.name}" if f"{source}.{a.name}" in MODULES else source for a in node.names]
-        else:
-            continue
-        yield from (name for name in names if name in MODULES and name != module)
+MODULES = modules_in(PACKAGE)
 
 
 def imported_by_name(module: str) -> Iterator[str]:
@@ -61,9 +46,9 @@ def imported_by_name(module: str) -> Iterator[str]:
 
 
 @cache
-def imports() -> dict[str, set[str]]:
+def imports() -> Graph:
     """Of each module; every worker collects this file, and one runs it."""
-    return {module: set(imported(module)) for module in MODULES}
+    return Package(PACKAGE).imports
 
 
 def place(module: str) -> float:

@@ -320,15 +320,13 @@ def _without_exceeding(states: Sequence[LMState], steps: int, settings: FitSetti
 
 def _best_of_each(tasks: Sequence[FitTask], states: Sequence[LMState]) -> list[LMState]:
     """Of running fits that free the same parameters the one of the least cost goes on."""
+    freed = [tuple(task.slots.tolist()) for task in tasks]
     best: dict[tuple[int, ...], float] = {}
-    for task, state in zip(tasks, states, strict=True):
-        key = tuple(task.slots.tolist())
-        best[key] = min(best.get(key, np.inf), float(state.f))
+    for one, state in zip(freed, states, strict=True):
+        best[one] = min(best.get(one, np.inf), float(state.f))
     return [
-        _ended_as_exceeded(state)
-        if state.status == Status.RUNNING and float(state.f) > best[tuple(task.slots.tolist())]
-        else state
-        for task, state in zip(tasks, states, strict=True)
+        _ended_as_exceeded(state) if state.status == Status.RUNNING and float(state.f) > best[one] else state
+        for one, state in zip(freed, states, strict=True)
     ]
 
 

@@ -22,6 +22,7 @@ from smajax.report.sweep_folder import as_png
 from smajax.report.sweep_numbers import digest_of
 from studies.disturbances.loops import events_of, plants, positions
 from studies.disturbances.scenarios import HELD, SECONDS, STEP, Scenario, scenarios
+from studies.marked import put
 from studies.requirement.run import gains_of
 
 HERE = Path(__file__).parent
@@ -115,9 +116,3 @@ def main(arguments: list[str]) -> None:
         replace(HERE / f"{key}.png", whole)
         text = put(text, f"<!-- {key} -->", table(results, key))
     replace(HERE / "README.md", text)
-
-
-def put(text: str, mark: str, inner: str) -> str:
-    """The text with `inner` between the two marks."""
-    before, _, rest = text.partition(mark)
-    return f"{before}{mark}\n\n{inner}\n\n{mark}{rest.partition(mark)[2]}"

@@ -27,6 +27,7 @@ from smajax.export.single_precision import DOUBLE  # noqa: E402
 from smajax.model.rigs import arm  # noqa: E402
 from studies.exported_code.built import library  # noqa: E402
 from studies.exported_code.run import source_of  # noqa: E402
+from studies.marked import put  # noqa: E402
 
 HERE = Path(__file__).parent
 MARK = "<!-- table -->"
@@ -108,9 +109,8 @@ def main() -> None:
         results["controllers"][name] = measured(name)
         print(name, json.dumps(results["controllers"][name]), flush=True)
     replace(HERE / "results.json", json_text(results))
-    before, _, rest = (HERE / "README.md").read_text(encoding="utf-8").partition(MARK)
-    after = rest.partition(MARK)[2]
-    replace(HERE / "README.md", f"{before}{MARK}\n\n{table(results)}\n\n{MARK}{after}")
+    page = HERE / "README.md"
+    replace(page, put(page.read_text(encoding="utf-8"), MARK, table(results)))
 
 
 if __name__ == "__main__":

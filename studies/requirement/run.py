@@ -22,6 +22,7 @@ from smajax.core.files import json_text, replace
 from smajax.core.parameters import get_parameters
 from smajax.core.runtime import prepare
 from smajax.model.rigs import arm
+from studies.marked import put
 from studies.requirement.search import (
     DELAY,
     FILTER,
@@ -195,12 +196,6 @@ def _search_again(names: list[str], quick: float, seed: int) -> None:
         write_gains(GAINS / f"{name}.json", gains, gains.units(arm()), more)
 
 
-def _put(text: str, mark: str, inner: str) -> str:
-    before, _, rest = text.partition(mark)
-    _, _, after = rest.partition(mark)
-    return f"{before}{mark}\n\n{inner}\n\n{mark}{after}"
-
-
 def main(arguments: list[str]) -> None:
     """Search what is asked for, judge all, write."""
     prepare(cores=True)
@@ -247,8 +242,8 @@ def _write(results: dict[str, Any]) -> None:
     in_order = {name: results["controllers"][name] for name in CONTROLLERS if name in results["controllers"]}
     results["controllers"] = in_order
     replace(HERE / "results.json", json_text(results))
-    text = _put((HERE / "README.md").read_text(encoding="utf-8"), MARK, table(in_order))
-    replace(HERE / "README.md", _put(text, FRONTIER_MARK, frontier_table(results.get("frontier", {}))))
+    text = put((HERE / "README.md").read_text(encoding="utf-8"), MARK, table(in_order))
+    replace(HERE / "README.md", put(text, FRONTIER_MARK, frontier_table(results.get("frontier", {}))))
 
 
 if __name__ == "__main__":

@@ -12,16 +12,20 @@ Function = ast.FunctionDef | ast.AsyncFunctionDef
 KINDS = (ast.Import, ast.ImportFrom, ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef, ast.AnnAssign)
 
 
+def modules_in(folder: Path) -> dict[str, Path]:
+    """The files of the package in a folder by the name of their module."""
+    files = {
+        ".".join(path.relative_to(folder.parent).with_suffix("").parts): path for path in sorted(folder.rglob("*.py"))
+    }
+    return {name.removesuffix(".__init__"): path for name, path in files.items()}
+
+
 class Package:
     """The modules of a package by name, parsed, with what each imports."""
 
     def __init__(self, folder: Path):
         self.name = folder.name
-        files = {
-            ".".join(path.relative_to(folder.parent).with_suffix("").parts): path
-            for path in sorted(folder.rglob("*.py"))
-        }
-        self.files = {name.removesuffix(".__init__"): path for name, path in files.items()}
+        self.files = modules_in(folder)
         text = {name: path.read_text("utf-8") for name, path in self.files.items()}
         self.lines = {name: len(one.splitlines()) for name, one in text.items()}
         self.nodes = {

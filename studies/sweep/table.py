@@ -8,6 +8,7 @@ from typing import Any
 
 from smajax.control.presets import CONTROLLERS, with_printed_law
 from smajax.core.files import replace
+from studies.marked import put
 
 HERE = Path(__file__).parent
 MARK, OTHERS_MARK = "<!-- table -->", "<!-- others -->"
@@ -74,12 +75,6 @@ def others_table(records: dict[str, dict[str, Any]]) -> str:
 def record_of(folder: str) -> dict[str, Any]:
     """The record of a sweep of `run.py`, by its folder."""
     return json.loads((HERE / folder / "sweep.json").read_text(encoding="utf-8"))
-
-
-def put(text: str, mark: str, inner: str) -> str:
-    """The text with `inner` between the two marks."""
-    before, _, rest = text.partition(mark)
-    return f"{before}{mark}\n\n{inner}\n\n{mark}{rest.partition(mark)[2]}"
 
 
 def main() -> None:

@@ -14,6 +14,7 @@ from smajax.core.files import json_text, replace
 from smajax.core.runtime import prepare
 from smajax.model.rigs import arm
 from smajax.model.system import System
+from studies.marked import put
 from studies.time_optimal.bang import switched_voltage, switching_times
 from studies.time_optimal.direct import PIECE, settled_directly
 
@@ -76,9 +77,8 @@ def _write(rows: list[dict[str, Any]]) -> None:
     text = json_text({"rows": rows})
     replace(HERE / "results.json", text)
     rows = json.loads(text)["rows"]  # where what is never has no number
-    before, _, rest = (HERE / "README.md").read_text(encoding="utf-8").partition(MARK)
-    _, _, after = rest.partition(MARK)
-    replace(HERE / "README.md", f"{before}{MARK}\n\n{table(rows)}\n\n{MARK}{after}")
+    page = HERE / "README.md"
+    replace(page, put(page.read_text(encoding="utf-8"), MARK, table(rows)))
 
 
 if __name__ == "__main__":
