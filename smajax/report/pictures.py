@@ -7,7 +7,8 @@ plots on its own is not disturbed.
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -25,9 +26,12 @@ SAMPLES_DRAWN = 3000  # per curve: more than the pixels across
 LEAST_PROBABILITY = 0.01  # of an effect that is drawn
 
 
-def as_png(figure: Figure, dpi: int = DPI) -> bytes:
+def as_png(
+    figure: Figure, dpi: int = DPI, texts: Mapping[str, str | None] = MappingProxyType({"Software": None})
+) -> bytes:
+    """texts: what the file says of itself, by keyword; None leaves one out."""
     stream = io.BytesIO()
-    figure.savefig(stream, format="png", dpi=dpi, facecolor="white", metadata={"Software": None})
+    figure.savefig(stream, format="png", dpi=dpi, facecolor="white", metadata=dict(texts))
     return stream.getvalue()
 
 

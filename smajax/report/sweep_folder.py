@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
@@ -28,6 +27,7 @@ from smajax.core.wording import aligned
 from smajax.model.system import System
 from smajax.report.drawing import UPRIGHT
 from smajax.report.next_steps import after_sweep
+from smajax.report.pictures import as_png
 from smajax.report.series_plot import SeriesPlot
 from smajax.report.sweep_dataset import as_dataset
 from smajax.report.sweep_numbers import IN_PICTURE, comparison_digest, digest_of, lines_digest, map_numbers
@@ -77,8 +77,8 @@ def write_sweep(
     results: list[ControllerSweep] = []
 
     def write_picture(name: str, size: tuple[float, float], draw: Callable[[Figure], None], numbers: str) -> None:
-        replace(out / name, as_png(draw, size, 90, numbers))
-        upright[name] = as_png(draw, (UPRIGHT, size[1]), 140, numbers)
+        replace(out / name, numbered_png(draw, size, 90, numbers))
+        upright[name] = numbered_png(draw, (UPRIGHT, size[1]), 140, numbers)
 
     for one in sweeps:
         results.append(one)
@@ -118,12 +118,11 @@ def write_sweep(
     return whole
 
 
-def as_png(draw: Callable[[Figure], None], size: tuple[float, float], dpi: int, numbers: str) -> bytes:
+def numbered_png(draw: Callable[[Figure], None], size: tuple[float, float], dpi: int, numbers: str) -> bytes:
     """numbers: a digest of those that are drawn, which the picture holds as text."""
-    figure, image = Figure(figsize=size), io.BytesIO()
+    figure = Figure(figsize=size)
     draw(figure)
-    figure.savefig(image, dpi=dpi, facecolor="white", format="png", metadata={IN_PICTURE: numbers})
-    return image.getvalue()
+    return as_png(figure, dpi, {IN_PICTURE: numbers})
 
 
 def as_text(results: SweepResults) -> str:

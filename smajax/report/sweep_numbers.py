@@ -77,8 +77,8 @@ def map_numbers(grid: Grid, sweep: ControllerSweep) -> dict[str, dict[str, list[
     }
 
 
-def plain(values: np.ndarray) -> Any:
-    """Nested lists of numbers with `DIGITS` digits; None for what is no number."""
+def plain(values: Any) -> Any:
+    """A number, or nested lists of an array's, with `DIGITS` digits; None for what is no number."""
     if np.ndim(values):
         return [plain(one) for one in values]
     value = float(values)

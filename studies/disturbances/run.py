@@ -18,8 +18,8 @@ from smajax.control.presets import CONTROLLERS
 from smajax.core.files import json_text, replace
 from smajax.core.runtime import prepare
 from smajax.report.drawing import named, panels
-from smajax.report.sweep_folder import as_png
-from smajax.report.sweep_numbers import digest_of
+from smajax.report.sweep_folder import numbered_png
+from smajax.report.sweep_numbers import digest_of, plain
 from studies.disturbances.loops import events_of, plants, positions
 from studies.disturbances.scenarios import HELD, SECONDS, STEP, Scenario, scenarios
 from studies.marked import put
@@ -39,15 +39,11 @@ def judged(scenario: Scenario, angles: np.ndarray) -> dict[str, Any]:
         "events": len(flat),
         "recovered": int(np.isfinite(flat[:, 1]).sum()),
         **{
-            name: {"median": _plain(np.median(column)), "worst": _plain(column.max())}
+            name: {"median": plain(np.median(column)), "worst": plain(column.max())}
             for name, column in zip(FIGURES, flat.T, strict=True)
         },
-        "nominal": [dict(zip(FIGURES, map(_plain, event), strict=True)) for event in events[0]],
+        "nominal": [dict(zip(FIGURES, map(plain, event), strict=True)) for event in events[0]],
     }
-
-
-def _plain(value: float) -> float | None:
-    return float(f"{float(value):.4g}") if math.isfinite(value) else None
 
 
 def table(results: dict[str, Any], name: str) -> str:
@@ -112,7 +108,7 @@ def main(arguments: list[str]) -> None:
     text = (HERE / "README.md").read_text(encoding="utf-8")
     for key, scenario in happenings.items():
         digest = results["pictures"][f"{key}.png"]
-        whole = as_png(partial(draw, scenario=scenario, angles=drawn[key]), (11.0, 10.0), 90, digest)
+        whole = numbered_png(partial(draw, scenario=scenario, angles=drawn[key]), (11.0, 10.0), 90, digest)
         replace(HERE / f"{key}.png", whole)
         text = put(text, f"<!-- {key} -->", table(results, key))
     replace(HERE / "README.md", text)

@@ -31,7 +31,7 @@ from smajax.control.sweep.run_sweep import TRUE_STATE, SweepSettings, may_resume
 from smajax.core.parameters import get_parameters, set_parameters
 from smajax.model.rigs import arm
 from smajax.model.system import System
-from smajax.report.sweep_folder import as_png, write_sweep
+from smajax.report.sweep_folder import numbered_png, write_sweep
 from smajax.report.sweep_numbers import IN_PICTURE, comparison_digest, digest_of
 from tests.helpers.in_browser import HOSTILE, faults
 from tests.helpers.machine_code import by_machine_code
@@ -294,6 +294,6 @@ def test_the_record_has_a_digest_of_the_numbers_that_each_picture_draws(folder: 
 
 
 def test_a_picture_holds_the_digest_of_its_numbers_as_text(drawn: None) -> None:
-    image = as_png(lambda figure: None, (1.0, 1.0), 50, digest_of([1.0, None]))
+    image = numbered_png(lambda figure: None, (1.0, 1.0), 50, digest_of([1.0, None]))
     with Image.open(io.BytesIO(image)) as picture:
         assert picture.info[IN_PICTURE] == digest_of([1.00001, None]) != digest_of([1.001, None])
