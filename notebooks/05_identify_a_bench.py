@@ -28,9 +28,10 @@ print(len(experiment.unknowns), "unknowns, of them of effects:", ", ".join(exper
 
 # %%
 result = sma.identify(experiment, starts=0)
+words = sma.narrate(result)
 for one in result.estimates:
     error = "not identifiable from these runs" if one.standard_error is None else f"± {one.standard_error:.3g}"
-    print(f"{one.name:42s} {one.value:12.5g} {error} {one.unit} {one.remark}")
+    print(f"{one.name:42s} {one.value:12.5g} {error} {one.unit} {words.remarks[one.name]}")
 
 # %% [markdown]
 # The held-out stress validates the fit.

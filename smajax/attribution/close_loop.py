@@ -21,12 +21,13 @@ from smajax.attribution.findings import (
     NoiseWithoutRun,
     PredictsTooLittle,
     Rejected,
+    Remaining,
     Verdict,
 )
 from smajax.attribution.found import effects_found, parameters_found, priors_found
 from smajax.attribution.held_out import Compared, compare, every_run, validated
 from smajax.attribution.input_of_run import corrected, record_error
-from smajax.attribution.job import Job, cannot_show, effects_excluded, job_of
+from smajax.attribution.job import Job, effects_excluded, job_of
 from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.joint_stage import base_alone, likeliest_so_far, search_by_evidence, search_without
 from smajax.attribution.laplace_evidence import FittedModel
@@ -39,23 +40,20 @@ from smajax.attribution.saved_model import fit_run_states, saved_model
 from smajax.attribution.step_size_check import finer_integration, integration_error_of
 from smajax.attribution.unknown_term import Lacking, in_place_of, unknown_terms
 from smajax.attribution.verdict import verdict_of
-from smajax.core.progress import Progress, Stage, as_progress, quiet, report_checks
+from smajax.core.progress import Progress, Result, Stage, as_progress, quiet, report_warnings
 from smajax.core.provenance import made_with
 from smajax.core.result_cache import ResultCache
 from smajax.data.experiment.record import Experiment
+from smajax.fit.identifiability import Checks, TakenAt, identifiability
 from smajax.fit.levenberg_marquardt import Fit
 from smajax.fit.preset_priors import visible
 from smajax.fit.sensitivity import sensitivity
-from smajax.fit.uncertainty import identifiability
 from smajax.simulation.steppers import Integration
 
 SEED = 2004
 MOST_SEARCHES = 2  # the first, and again without what the held-out runs rejected
 MOST_RECORD_ERRORS = 2  # of single runs that are corrected: with more of them nothing is left that says which is right
 EVERY, RARELY = 60.0, 8.0  # s before the first page of a search that goes on; times what the last took before the next
-REST_OF_THE_SEARCH = "the rest of the search, and the checks of what it finds"
-SEARCH_TO_COME = "the search for effects, and the checks of what it finds"
-CHECKS_TO_COME = "the checks against an unknown function, an outlier run and the held-out runs"
 CHECKING, WRITING = "checking what these runs determine", "standard errors and pictures"
 
 
@@ -71,7 +69,7 @@ class Context:
     start: np.ndarray  # (P,), start values of the parameters of base model and library
     base: Fit  # the base model
     seed: int
-    check: tuple[str, ...]
+    checks: Checks
     interim: Interim | None
 
 
@@ -128,7 +126,7 @@ def close_loop(  # keywords, which a caller names one by one
     settings = config or AttributionConfig()
     context = prepared(experiment, cache, as_progress(progress), seed, settings, interim)
     if interim is not None:
-        interim(known_so_far(context, base_alone(context.setting, context.base), SEARCH_TO_COME))
+        interim(known_so_far(context, base_alone(context.setting, context.base), Remaining.SEARCH))
     context, outcome = searched_finely(context)
     errors: list[RecordError] = []
     while len(errors) < MOST_RECORD_ERRORS and (wrong := wrong_record(context, outcome)) is not None:
@@ -138,7 +136,7 @@ def close_loop(  # keywords, which a caller names one by one
         context = prepared(right, cache, context.setting.progress, seed, settings, interim)
         context, outcome = searched_finely(context)
     if interim is not None and not context.setting.is_noise(outcome.final):
-        interim(known_so_far(context, (outcome.search, outcome.base, outcome.final), CHECKS_TO_COME))
+        interim(known_so_far(context, (outcome.search, outcome.base, outcome.final), Remaining.CHECKS))
     outcome, rejected = against_the_held_out_runs(context, outcome)
     outcome = against_an_unknown_term(context, outcome)
     outcome = against_an_outlier_run(context, outcome)
@@ -173,7 +171,7 @@ def prepared(  # the stage's inputs, each once
         declared=experiment.priors,
     )
     if integration is None:
-        report_checks(progress, experiment.warnings, ())
+        report_warnings(progress, experiment.warnings)
     base = setting.base(start, seed)
     if integration is None:
         # It was chosen where the fit begins, at which the wire may not even move. Now, and not when the whole search has been made with it.
@@ -185,10 +183,11 @@ def prepared(  # the stage's inputs, each once
     at_fit = sensitivity(problem, base.values[np.asarray(index)], [*job.unknowns, *job.presets])
     values = dict(zip(job.problem.names, base.values.tolist(), strict=True))
     setting.presets = visible(at_fit, values, job.presets)
-    identifiable = (*identifiability(at_fit, job.unknowns, job.bounds, "at the base model's fit"), *cannot_show(job))
+    identifiable = identifiability(at_fit, job.unknowns, job.bounds, TakenAt.BASE_FIT)
+    checks = Checks(identifiable, hidden_by_one_force=job.hidden_by_one_force)
     progress(Stage(CHECKING, 1.0))
-    report_checks(progress, (), identifiable)
-    context = Context(job, setting, start, base, seed, (*experiment.warnings, *identifiable), interim)
+    progress(Result(checks))
+    context = Context(job, setting, start, base, seed, checks, interim)
     setting.after_round = None if interim is None else _now_and_then(context, interim)
     return context
 
@@ -201,7 +200,7 @@ def _now_and_then(context: Context, interim: Interim) -> Callable[[JointSearch, 
         nonlocal began, cost
         now = clock.monotonic()
         if best.effects and now - began > RARELY * cost:
-            interim(known_so_far(context, likeliest_so_far(search, best), REST_OF_THE_SEARCH))
+            interim(known_so_far(context, likeliest_so_far(search, best), Remaining.REST_OF_THE_SEARCH))
             began = clock.monotonic()
             cost = began - now
 
@@ -294,13 +293,14 @@ def unknown_terms_of(context: Context, outcome: Outcome, verdict: Verdict) -> tu
     return lacking, outcome.superseded
 
 
-def known_so_far(context: Context, models: tuple[JointSearch, Model, Model], remaining: str) -> Findings:
+def known_so_far(context: Context, models: tuple[JointSearch, Model, Model], remaining: Remaining) -> Findings:
     """What a loop that goes on knows by then, as findings without a verdict. `models`: the search, base model, likeliest model."""
     search, base, final = models
     compared = compare(context.job, context.setting, base, final)
     found = findings_of(context, Outcome(search, base, final, Lacking()), compared, brief=True)
     base_model, extended_model = (
-        None if one is None else replace(one, unfinished=remaining) for one in (found.base_model, found.extended_model)
+        None if one is None else replace(one, unfinished=remaining.value)
+        for one in (found.base_model, found.extended_model)
     )
     return replace(
         found,
@@ -342,7 +342,8 @@ def findings_of(
         title=experiment.title,
         source=experiment.path.name,
         verdict=verdict,
-        check=context.check,
+        warnings=experiment.warnings,
+        checks=context.checks,
         output_name=experiment.output_name,
         output_unit=experiment.output_unit,
         noise_sigma=experiment.noise_sigma,

@@ -18,6 +18,7 @@ from smajax.attribution.config import AttributionConfig
 from smajax.attribution.prior_finding import PriorFinding
 from smajax.attribution.record_error import OutlierRun, RecordError
 from smajax.data.model_file.actuator_model import ActuatorModel
+from smajax.fit.identifiability import Checks
 from smajax.fit.integration import IntegrationError
 from smajax.fit.uncertainty import Remark
 
@@ -32,6 +33,15 @@ class Verdict(StrEnum):
     PARTLY_EXPLAINED = "partly explained"
     NOT_IN_LIBRARY = "not in the library"
     NOT_FINISHED = "not finished"  # of a loop that goes on, or was ended before its end
+
+
+class Remaining(StrEnum):
+    """What a loop that goes on has still to do."""
+
+    NOTHING = ""
+    SEARCH = "the search for effects, and the checks of what it finds"
+    REST_OF_THE_SEARCH = "the rest of the search, and the checks of what it finds"
+    CHECKS = "the checks against an unknown function, an outlier run and the held-out runs"
 
 
 @dataclass(frozen=True)
@@ -295,7 +305,7 @@ _RENAMED = {
     "rivals": "confounders",
     "lone_runs": "outlier_runs",
 }
-_NARRATED = ("summary", "unexplained", "cannot_know")
+_NARRATED = ("summary", "unexplained", "cannot_know", "check")
 
 
 @dataclass(frozen=True)
@@ -304,9 +314,8 @@ class Findings:
     title: str
     source: str  # path of the experiment file as given
     verdict: Verdict
-    check: tuple[
-        str, ...
-    ]  # what the experiment file and the Jacobian at the start gave rise to, before anything was fitted
+    warnings: tuple[str, ...]  # of the experiment file
+    checks: Checks  # at the base model's fit
     output_name: str
     output_unit: str  # SI
     noise_sigma: float
@@ -344,7 +353,7 @@ class Findings:
     base_model: ActuatorModel | None = None  # as they are saved
     extended_model: ActuatorModel | None = None
     effects_excluded: int = 0  # effects that this model can show and the experiment file keeps from being candidates
-    remaining: str = ""  # stages that were still to come, of what is known while a loop goes on
+    remaining: Remaining = Remaining.NOTHING  # of what is known while a loop goes on
 
     @property
     def integration_error(self) -> float:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 from smajax.attribution.run_extent import extent_of
 from smajax.core.parameters import parameter_values, parameters
-from smajax.core.wording import and_listed
 from smajax.data.experiment.record import Experiment, Run
 from smajax.data.model_catalogue import candidates
 from smajax.fit.base_model import base_model
@@ -80,17 +79,6 @@ def job_of(experiment: Experiment, integration: Integration | None = None) -> Jo
         candidates=names,
         presets=presets,
         hidden_by_one_force=hidden,
-    )
-
-
-def cannot_show(job: Job) -> tuple[str, ...]:
-    """Which effects the fit runs cannot show, in a sentence."""
-    if not job.hidden_by_one_force:
-        return ()
-    titles = and_listed([LIBRARY[name].candidate.title for name in job.hidden_by_one_force])
-    return (
-        f"In all fit runs the load pulls with the same force, so what depends on the stress cannot show: {titles} are not looked for. "
-        "Runs under another load would show them.",
     )
 
 

@@ -86,12 +86,10 @@ def part_of(progress: Progress, place: int, parts: int) -> Progress:
     return scaled
 
 
-def report_checks(progress: Progress, warned: Iterable[str], identifiable: Iterable[str]) -> None:
-    """What was found before a fit: what looks wrong, as warnings, and what the runs determine, as messages."""
-    for line in warned:
+def report_warnings(progress: Progress, found: Iterable[str]) -> None:
+    """What looks wrong before a fit."""
+    for line in found:
         progress(WarningMessage(f"check: {line}"))
-    for line in identifiable:
-        progress(Message(f"check: {line}"))
 
 
 def as_progress(callback: Callable[..., Any]) -> Progress:

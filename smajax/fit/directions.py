@@ -1,4 +1,4 @@
-"""Combinations of parameters that the runs determine poorly, in words: the weak singular vectors of the Jacobian."""
+"""Combinations of parameters that the runs determine poorly: the weak singular vectors of the Jacobian."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from smajax.core.wording import and_listed
+from smajax.fit.old_words import worded
 from smajax.fit.sensitivity import Sensitivity
 
 NAMED = 0.3  # a parameter with a smaller share of a direction's largest is not named
@@ -27,25 +27,26 @@ class Direction:
     relative_error: float
     temperatures: frozenset[str] = frozenset()
 
-    def sentence(self) -> str:
-        """For an engineer."""
-        named = {name: share for name, share in self.shares.items() if abs(share) >= NAMED}
-        if self.relative_error >= UNBOUND:
-            if len(named) == 1:
-                return f"Nothing in these runs depends on {next(iter(named))}."
-            return f"These runs determine only a combination of {and_listed(list(named))}: none of them is identifiable by itself."
-        if len(named) == 1:
-            name = next(iter(named))
-            return f"{name} is known to {self._size(name, 1.0)} only."
-        changes = and_listed([f"{name} by {self._size(name, share, '+')}" for name, share in named.items()])
-        return (
-            f"{and_listed(list(named))} are correlated: a change of {changes} at the same time is one standard error."
-        )
+    @property
+    def named(self) -> dict[str, float]:
+        """The shares that are large enough to be named."""
+        return {name: share for name, share in self.shares.items() if abs(share) >= NAMED}
 
-    def _size(self, name: str, share: float, sign: str = "") -> str:
-        """One standard error of `name`, in per cent of its value or in kelvins."""
-        unit, whole = ("K", KELVINS) if name in self.temperatures else ("%", 100.0)
-        return f"{whole * self.relative_error * share:{sign}.2g} {unit}"
+    @property
+    def unbound(self) -> bool:
+        """Whether nothing in the runs depends on it."""
+        return self.relative_error >= UNBOUND
+
+    def sentence(self) -> str:
+        """In words; DeprecationWarning."""
+        return str(
+            worded(
+                "direction.sentence()",
+                "identifiability_words.direction_sentence(direction)",
+                "direction_sentence",
+                self,
+            )
+        )
 
 
 def directions(
@@ -72,6 +73,6 @@ def directions(
     return tuple(combinations)
 
 
-def weak_combinations(combinations: Sequence[Direction]) -> list[str]:
-    """Sentences about the combinations that are poorly determined; none when all are well determined."""
-    return [direction.sentence() for direction in combinations if direction.relative_error > WEAK]
+def weak(combinations: Sequence[Direction]) -> tuple[Direction, ...]:
+    """Those that are poorly determined."""
+    return tuple(one for one in combinations if one.relative_error > WEAK)

@@ -14,9 +14,9 @@ from smajax.core.provenance import made_with
 from smajax.core.result_cache import ResultCache
 from smajax.data.experiment.record import Experiment
 from smajax.fit.design import suggestions
-from smajax.fit.directions import Direction, directions, weak_combinations
+from smajax.fit.directions import Direction, directions
 from smajax.fit.identified_model import identified_model
-from smajax.fit.identify_result import Estimate, Identified, IdentifiedOutput, IdentifiedRun, IdentifiedSeries
+from smajax.fit.identify_result import Estimate, FitEnd, Identified, IdentifiedOutput, IdentifiedRun, IdentifiedSeries
 from smajax.fit.identify_stages import (
     EDGE,
     Fitted,
@@ -32,7 +32,6 @@ from smajax.fit.identify_stages import (
 from smajax.fit.posterior import ChainSettings, Posterior, posterior
 from smajax.fit.profile import EQUAL_COST, profiles
 from smajax.fit.starts import SCREENED
-from smajax.fit.uncertain_presets import values_not_given
 from smajax.fit.uncertainty import Uncertainty, at_bound
 
 SEED = 2004
@@ -63,7 +62,7 @@ def identify(  # ten parameters: the options of the command, by keyword
     options = Options(starts, profiled, robust, design, draws, seed, ResultCache(memory), as_progress(progress))
     begin = clock.monotonic()
     setup = set_up(experiment, options)
-    check = check_identifiability(setup, options)
+    checks = check_identifiability(setup, options)
     setup, fitted, integration = fit_within_tolerance(setup, options)
     statistics = statistics_at(setup, fitted, options)
     names, names_with_effect, weakest = setup.names, *_directions(setup, fitted, statistics)
@@ -85,13 +84,13 @@ def identify(  # ten parameters: the options of the command, by keyword
         title=experiment.title,
         source=experiment.path.name,
         outputs=_outputs(setup, fitted, statistics, robust),
-        stopped=_stopped(fitted, statistics.inflation),
-        check=check,
+        ended=_fit_end(fitted, statistics.inflation, options),
+        warnings=experiment.warnings,
+        checks=checks,
         estimates=_estimates(setup, fitted, statistics.uncertainty),
         values_of_held_out_runs=fitted.values_of_held_out_runs,
         correlated=statistics.correlated,
         correlation=statistics.covariance / np.outer(spread, spread),
-        weak=tuple(weak_combinations(weakest)),
         all_took_part=len(names_with_effect) == len(names),
         directions=weakest,
         profiles=drawn,
@@ -112,7 +111,7 @@ def identify(  # ten parameters: the options of the command, by keyword
         step=experiment.step,
         clocked=experiment.clocked,
         provenance=_provenance(command, seed, starts, clock.monotonic() - begin, options.cache),
-        held_presets=tuple(values_not_given(experiment, setup.problem.system)[0]),
+        held_presets=checks.held_presets,
         fitted_presets=experiment.fitted_presets,
         model=identified_model(setup, fitted, statistics, runs),
     )
@@ -158,20 +157,16 @@ def _estimates(setup: Setup, fitted: Fitted, known: Uncertainty) -> tuple[Estima
             upper=unknown.high,
             start=start[name],
             prior=unknown.prior,
-            remark=known.remark[name],
+            note=known.remarks[name],
         )
         for name, unknown in setup.unknowns.items()
     )
 
 
-def _stopped(fitted: Fitted, inflation: float) -> str:
-    """Why the fit ended, and how many starts came to the same."""
-    best, fits = fitted.best, fitted.fits
+def _fit_end(fitted: Fitted, inflation: float, options: Options) -> FitEnd:
+    best, fits, settings = fitted.best, fitted.fits, options.fit("fitting")
     same = sum(fit.cost - fits[0].cost <= EQUAL_COST * inflation for fit in fits)
-    return (
-        f"The fit stopped after {best.steps} steps: {best.reason}. {same} of the {len(fits)} fits run until their end "
-        f"found the same least cost{'' if same == len(fits) else ', the others a higher one'}."
-    )
+    return FitEnd(best.status, best.steps, settings.max_steps, settings.tolerance, len(fits), same)
 
 
 def _decorrelated(runs: Sequence[np.ndarray], step: float) -> np.ndarray:

@@ -10,9 +10,13 @@ from smajax.data.experiment.record import Prior
 from smajax.data.model_file.actuator_model import ActuatorModel
 from smajax.fit.design import Suggestion
 from smajax.fit.directions import Direction
+from smajax.fit.identifiability import Checks
 from smajax.fit.integration import IntegrationError
+from smajax.fit.levenberg_marquardt import Status
+from smajax.fit.old_words import worded
 from smajax.fit.posterior import Posterior
 from smajax.fit.profile import Profile
+from smajax.fit.uncertainty import Remark
 
 
 @dataclass(frozen=True)
@@ -27,7 +31,24 @@ class Estimate:
     upper: float
     start: float
     prior: Prior | None
-    remark: str
+    note: Remark
+
+    @property
+    def remark(self) -> str:
+        """`note` in words; DeprecationWarning."""
+        return str(worded("estimate.remark", "narrate(identified).remarks[name]", "remark_text", self.note))
+
+
+@dataclass(frozen=True)
+class FitEnd:
+    """Why the best fit ended, and how many starts came to the same."""
+
+    status: Status
+    steps: int
+    most_steps: int
+    tolerance: float  # share of the cost, below which a fit has converged
+    fits: int  # that were run until their end
+    same_cost: int  # of these, with the least cost
 
 
 @dataclass(frozen=True)
@@ -77,15 +98,15 @@ class Identified:
     title: str
     source: str
     outputs: tuple[IdentifiedOutput, ...]
-    stopped: str
-    check: tuple[str, ...]
+    ended: FitEnd
+    warnings: tuple[str, ...]  # of the experiment file
+    checks: Checks  # at the initial guess
     estimates: tuple[Estimate, ...]
     values_of_held_out_runs: dict[str, float]  # values of single held-out runs, fitted with all others fixed
     correlated: tuple[str, ...]
     correlation: np.ndarray
-    weak: tuple[str, ...]
-    all_took_part: bool  # whether `weak` covers every parameter: none at a bound or without any effect
-    directions: tuple[Direction, ...]
+    all_took_part: bool  # whether `directions` covers every parameter: none at a bound or without any effect
+    directions: tuple[Direction, ...]  # weakest first
     profiles: tuple[Profile, ...]
     posterior: Posterior | None
     start_costs: tuple[float, ...]  # mean square over the noise's, of every fit that was run until its end
@@ -103,3 +124,19 @@ class Identified:
     held_presets: tuple[str, ...] = ()  # values that the file does not give, held at the presets'
     fitted_presets: tuple[str, ...] = ()  # values that the file does not give and that were fitted too
     model: ActuatorModel | None = None  # as it is saved
+
+    @property
+    def stopped(self) -> str:
+        """`ended` in words; DeprecationWarning."""
+        return str(worded("identified.stopped", "narrate(identified).ended", "ended_sentence", self.ended))
+
+    @property
+    def check(self) -> tuple[str, ...]:
+        """`warnings` and `checks` in words; DeprecationWarning."""
+        now = "narrate(identified).check"
+        return tuple(worded("identified.check", now, "check_sentences", self.warnings, self.checks))
+
+    @property
+    def weak(self) -> tuple[str, ...]:
+        """The weak ones of `directions` in words; DeprecationWarning."""
+        return tuple(worded("identified.weak", "narrate(identified).weak", "weak_combinations", self.directions))

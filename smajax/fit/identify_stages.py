@@ -11,11 +11,12 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.core.names import listed
-from smajax.core.progress import Progress, Stage, report_checks
+from smajax.core.progress import Progress, Result, Stage, report_warnings
 from smajax.core.result_cache import ResultCache
 from smajax.core.whiteness import LAGS, WHITE, correlation_time, split_runs, whiteness_p_value
 from smajax.data.experiment.record import Experiment, Run, Unknown
 from smajax.fit.experiment_problem import declared_problem, free_by_name
+from smajax.fit.identifiability import Checks, identifiability
 from smajax.fit.integration import IntegrationError, choose_integration, described, integration_error, with_integration
 from smajax.fit.levenberg_marquardt import Fit, FitSettings, levenberg_marquardt
 from smajax.fit.noise import fit_with_noise
@@ -26,14 +27,10 @@ from smajax.fit.robust import NORMAL, clipped, robust_fit, robust_variance, unwe
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.fit.starts import multistart
 from smajax.fit.uncertain_presets import values_not_given
-from smajax.fit.uncertainty import Uncertainty, covariance_of, identifiability, uncertainty
+from smajax.fit.uncertainty import Uncertainty, covariance_of, uncertainty
 from smajax.model.system import System
 from smajax.simulation.steppers import Integration
 
-UNUSED_PRIORS = (
-    "[priors] changes nothing here: they are of candidate effects and of the presets' values, which `smajax close-loop` fits (`--presets fitted` "
-    "the latter here too); a prior of an unknown stands in its own section, as prior = { mean = ..., sigma = ... }"
-)
 EDGE = 1e-6  # of the range: a fit within bounds comes to a bound itself
 
 
@@ -131,32 +128,21 @@ def set_up(experiment: Experiment, options: Options) -> Setup:
     return setup.integrated(choose_integration(every_run, every_run.system))
 
 
-def check_identifiability(setup: Setup, options: Options) -> tuple[str, ...]:
-    """Warnings of the file and which unknowns are identifiable at the initial guess; reported as well.
+def check_identifiability(setup: Setup, options: Options) -> Checks:
+    """Which unknowns are identifiable at the initial guess, and what the file gives or does not give without use; reported as well.
 
     Correlations are not among them: how large they are is known at the fit.
     """
     values = _full_values(setup.every_run, setup.problem, setup.problem.start_values())
     at = _of_fit_runs(sensitivity(setup.every_run, values, setup.names), setup)
-    sentences = identifiability(at, setup.names, setup.bounds, correlations=False)
-    held = _held(setup)
+    held = tuple(values_not_given(setup.experiment, setup.problem.system)[0])
     declared = setup.experiment.priors
     widths_alone = held and any(one.base is None for one in declared.presets.values())
-    unused = declared.odds or declared.coefficients or widths_alone
-    warnings = (*setup.experiment.warnings, *((UNUSED_PRIORS,) if unused else ()))
-    report_checks(options.progress, warnings, [*sentences, *held])
-    return (*warnings, *sentences, *held)
-
-
-def _held(setup: Setup) -> tuple[str, ...]:
-    """Which values are the presets' and held, in a sentence."""
-    names, _ = values_not_given(setup.experiment, setup.problem.system)
-    if not names:
-        return ()
-    return (
-        f"The file does not give {listed(tuple(names))}: held at the values of the presets, or at the base that [priors.presets] has. `--presets fitted` fits them too, "
-        "within what data sheets leave open, as close-loop does.",
-    )
+    unused = bool(declared.odds or declared.coefficients or widths_alone)
+    checks = Checks(identifiability(at, setup.names, setup.bounds, correlations=False), unused, held)
+    report_warnings(options.progress, setup.experiment.warnings)
+    options.progress(Result(checks))
+    return checks
 
 
 def fit_within_tolerance(setup: Setup, options: Options) -> tuple[Setup, Fitted, IntegrationError]:

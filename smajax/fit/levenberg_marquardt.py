@@ -54,6 +54,17 @@ PADDING = 8  # free parameters are padded to a multiple of this: one compiled pr
 DESCENT, SEARCH = BoundedDampedNewtonDescent(), GainRatioSearch()
 
 
+class Status(enum.IntEnum):
+    """Whether and why a fit has ended."""
+
+    RUNNING = 0
+    CONVERGED = 1
+    NO_DESCENT = 2
+    NOT_FINITE = 3
+    NOTHING_FREE = 4
+    EXCEEDED = 5
+
+
 @dataclass(frozen=True)
 class Fit:
     """One fit ended."""
@@ -61,7 +72,7 @@ class Fit:
     values: np.ndarray  # every parameter, shape (P,)
     cost: float  # sum of squared residuals, misfit over noise
     converged: bool
-    reason: str
+    status: Status
     steps: int
 
 
@@ -86,17 +97,6 @@ class FitSettings:
     cache: ResultCache = field(default_factory=ResultCache)
     progress: Progress = quiet
     stage: str = "fitting"
-
-
-class Status(enum.IntEnum):
-    """Whether and why a fit has ended."""
-
-    RUNNING = 0
-    CONVERGED = 1
-    NO_DESCENT = 2
-    NOT_FINITE = 3
-    NOTHING_FREE = 4
-    EXCEEDED = 5
 
 
 class LMState(eqx.Module):
@@ -284,7 +284,7 @@ def levenberg_marquardt(
             states = _best_of_each(tasks, states)
     cache.save(key, _packed(states, settings.max_steps))
     progress(Stage(settings.stage, 1.0))
-    return [_ended(task, state, settings) for task, state in zip(tasks, states, strict=True)]
+    return [_ended(task, state) for task, state in zip(tasks, states, strict=True)]
 
 
 def _best(
@@ -344,15 +344,7 @@ def _promised(descent: DescentState) -> Float[Array, ""]:
     return -(descent.gradient @ step + 0.5 * step @ descent.hessian @ step)
 
 
-def _ended(task: FitTask, state: LMState, settings: FitSettings) -> Fit:
-    reason = {
-        Status.RUNNING: f"{settings.max_steps} steps were not enough",
-        Status.CONVERGED: f"it has converged, no step lowers the cost by more than {settings.tolerance:.0e} of it",
-        Status.NO_DESCENT: "it has converged, no step lowers the cost any more",
-        Status.NOT_FINITE: "the model gives no number at the start",
-        Status.NOTHING_FREE: "no parameter is free",
-        Status.EXCEEDED: "other fits were far better after as many steps",
-    }[Status(int(state.status))]
-    cost = 2.0 * float(state.f)
-    converged = int(state.status) not in (Status.RUNNING, Status.EXCEEDED) and bool(np.isfinite(cost))
-    return Fit(task.values_at(np.asarray(state.y)[: len(task.slots)]), cost, converged, reason, int(state.steps))
+def _ended(task: FitTask, state: LMState) -> Fit:
+    status, cost = Status(int(state.status)), 2.0 * float(state.f)
+    converged = status not in (Status.RUNNING, Status.EXCEEDED) and bool(np.isfinite(cost))
+    return Fit(task.values_at(np.asarray(state.y)[: len(task.slots)]), cost, converged, status, int(state.steps))

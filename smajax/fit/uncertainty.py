@@ -1,4 +1,4 @@
-"""Standard errors that allow for an autocorrelated residual, and which parameters are identifiable from the runs."""
+"""Standard errors that allow for an autocorrelated residual, and which parameters have none."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import scipy  # its parts are imported when they are first used
 
 from smajax.core.correlation import correlation_of
 from smajax.core.whiteness import WHITE, bartlett_sum, correlation_time, split_runs, whiteness_p_value
-from smajax.core.wording import and_listed
+from smajax.fit.old_words import worded
 from smajax.fit.sensitivity import Sensitivity
 
 # A fitted value nearer to a bound than this share of the range counts as at the bound.
@@ -24,8 +24,6 @@ CORRELATED = 0.98
 # changes by more than the second share of its standard error along such a direction, within the bounds, has none.
 UNIDENTIFIABLE = 1e-5
 MOVED = 0.1
-# A predicted standard error beyond this share of the range: the runs add nothing to the bounds.
-UNDETERMINED = 0.25
 # A standard error above this share of the prior's: the runs add nothing to the prior.
 BARELY = 0.95
 FEW = 50  # independent samples that determine a parameter
@@ -62,13 +60,8 @@ class Remark:
 
     @property
     def text(self) -> str:
-        """Of a large correlated group the first other member is named, by which it can be found."""
-        if self.kind is RemarkKind.COMBINATION:
-            return f"only a combination of it with {', '.join(self.others)} is identifiable"
-        if self.kind is RemarkKind.CORRELATED:
-            many = len(self.others) > 2
-            return f"correlated with {and_listed([self.others[0], f'{len(self.others) - 1} others'] if many else self.others)}"
-        return self.kind.value
+        """In words; DeprecationWarning."""
+        return str(worded("remark.text", "identifiability_words.remark_text(remark)", "remark_text", self))
 
 
 @dataclass(frozen=True)
@@ -78,11 +71,6 @@ class Uncertainty:
     standard_error: dict[str, float | None]
     remarks: dict[str, Remark]
     correlated_groups: tuple[tuple[str, ...], ...] = ()
-
-    @property
-    def remark(self) -> dict[str, str]:
-        """The remarks in words."""
-        return {name: remark.text for name, remark in self.remarks.items()}
 
 
 def at_bound(value: float, low: float, high: float, edge: float = AT_BOUND) -> Remark:
@@ -228,89 +216,3 @@ def covariance_of(
     runs = split_runs(at.misfit, at.mask)
     covariance, scale = _covariance(at.columns(estimated), at.prior_columns(estimated), runs, variance)
     return estimated, covariance / np.outer(scale, scale)
-
-
-def _rank_sentence(rank: int, unknowns: int, samples: int, correlated: Sequence[str] | None) -> str:
-    """How many of the unknowns are identifiable. correlated: what is said of each group of them; None: not looked at."""
-    how = f"(Jacobian of {samples} samples, rank {rank})"
-    if rank == unknowns and correlated:
-        one, of_each = ("one of them", "") if len(correlated) == 1 else ("one", "Of each group ")
-        do = f"{of_each}fix {one} or measure runs that separate them."
-        return (
-            f"The {unknowns} unknowns are identifiable from these runs {how}, but not each by itself: {and_listed(correlated)}. "
-            f"{do[0].upper()}{do[1:]}"
-        )
-    if rank == unknowns:
-        which = f"All {unknowns} unknowns are" if unknowns > 1 else "The one unknown is"
-        later = (
-            ", each by itself as far as the correlations at the fit allow"
-            if correlated is None and unknowns > 1
-            else ""
-        )
-        return f"{which} identifiable from these runs {how}{later}."
-    if rank == 0:
-        return f"No unknown is identifiable from these runs {how}."
-    return (
-        f"Only {rank} combination{' is' if rank == 1 else 's are'} identifiable of the {unknowns} unknowns from these runs "
-        f"{how}: standard errors of the others mean nothing. "
-        f"Fix {unknowns - rank} of them."
-    )
-
-
-def _correlated(covariance: np.ndarray, names: Sequence[str]) -> list[str]:
-    """`a and b are correlated (up to 0.995)` for each group."""
-    correlation = np.abs(correlation_of(covariance))
-    result = []
-    for cluster in clusters(covariance):
-        pairs = correlation[np.ix_(cluster, cluster)][np.triu_indices(len(cluster), 1)]
-        # Cut and not rounded: 0.9996 is not yet 1.
-        most = np.floor(1e3 * float(pairs.max()) + 1e-6) / 1e3
-        result.append(f"{and_listed([names[index] for index in cluster])} are correlated (up to {most:.3f})")
-    return result
-
-
-def identifiability(
-    at: Sensitivity,
-    names: Sequence[str],
-    bounds: Mapping[str, tuple[float, float]],
-    where: str = "at the initial guess",
-    *,
-    correlations: bool = True,
-) -> list[str]:
-    """Which of `names` are identifiable from these runs, in sentences; `correlations`: and which are correlated.
-
-    From the Jacobian `where` it was taken and the noise alone: it holds only for a model that lacks no effect.
-    """
-    if not names:
-        return ["Nothing is declared unknown: the base model is taken as it is."]
-    columns = np.concatenate([at.columns(names), at.prior_columns(names)])
-    span = np.asarray([bounds[name][1] - bounds[name][0] for name in names])
-    scaled = columns * span
-    singular = np.linalg.svd(scaled, compute_uv=False)
-    rank = int(np.sum(singular > 1e-8 * singular[0])) if singular[0] > 0.0 else 0
-    without_effect = [name for index, name in enumerate(names) if not np.any(columns[:, index])]
-    sentences = [
-        f"{name}: nothing in these runs depends on it; fix it or measure something else." for name in without_effect
-    ]
-    if without_effect:
-        sentences.append(
-            f"That holds {where}: a wire that never transforms there shows no parameter of its transformation. Where that "
-            "is unexpected, check the bench's sizes, the drive and the initial guess first."
-        )
-    visible = [name for name in names if name not in without_effect]
-    groups: list[str] = []
-    if visible:
-        picked = scaled[:, [list(names).index(name) for name in visible]]
-        covariance = np.linalg.pinv(picked.T @ picked, rcond=1e-14, hermitian=True)
-        error = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-        sentences += [
-            f"{name}: the noise alone leaves more than a quarter of its range undetermined."
-            for name, value in zip(visible, error, strict=True)
-            if value > UNDETERMINED
-        ]
-        groups = _correlated(covariance, visible) if correlations else []
-    if groups and rank < len(names):
-        sentences += [f"{group}: fix one of them or measure runs that separate them." for group in groups]
-    elif correlations and not (sentences or groups) and 1 < len(names) == rank:
-        sentences.append("No two of them are strongly correlated.")
-    return [_rank_sentence(rank, len(names), len(scaled), groups if correlations else None), *sentences]

@@ -6,7 +6,7 @@ Numbers first, words last: `narrative` turns findings into sentences, `pictures`
 `write` puts the files into their folder, each whole or not at all. The modules `identify_*`, `sweep_*`, `tune_*` and
 `simulate_page` do the same for the other commands.
 
-Public: `Findings`, `Narrative`, `narrate`, `write_report`.
+Public: `Findings`, `IdentificationNarrative`, `Narrative`, `narrate`, `write_report`.
 """
 
 from importlib import import_module
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from smajax.attribution.findings import Findings as Findings
+    from smajax.report.narrative import IdentificationNarrative as IdentificationNarrative
     from smajax.report.narrative import Narrative as Narrative
     from smajax.report.narrative import narrate as narrate
     from smajax.report.write import write_report as write_report
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 # Imported when they are asked for: a command that writes no report needs no plotting library for a table.
 _WHERE = {
     "Findings": "smajax.attribution.findings",
+    "IdentificationNarrative": "smajax.report.narrative",
     "Narrative": "smajax.report.narrative",
     "narrate": "smajax.report.narrative",
     "write_report": "smajax.report.write",

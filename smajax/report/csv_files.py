@@ -10,6 +10,7 @@ import numpy as np
 from smajax.attribution.findings import Findings, ParameterFinding
 from smajax.core.files import csv_text, heading
 from smajax.model.channels import INPUT_UNITS
+from smajax.report.identifiability_words import remark_text
 
 if TYPE_CHECKING:
     from smajax.fit.identify_result import Identified  # which is made with words of this package
@@ -48,7 +49,7 @@ def findings_runs(findings: Findings) -> str:
 def identified_parameters(result: Identified) -> str:
     """The estimates, in the order of the record."""
     rows = [
-        [one.name, one.unit, one.value, one.standard_error, one.lower, one.upper, one.start, one.remark]
+        [one.name, one.unit, one.value, one.standard_error, one.lower, one.upper, one.start, remark_text(one.note)]
         for one in result.estimates
     ]
     head = ["parameter", "unit", "estimate", "standard error", "lower", "upper", "start", "remark"]

@@ -17,6 +17,7 @@ from smajax.report import pictures, run_plots
 from smajax.report.embedded import picture
 from smajax.report.formulas import typeset
 from smajax.report.frame import environment, parts_of_frame
+from smajax.report.identifiability_words import remark_text
 from smajax.report.narrative import Narrative, narrate
 from smajax.report.narrative.rounds import chosen_text
 from smajax.report.narrative.unknown import units
@@ -96,7 +97,7 @@ def _fitted(result: ParameterFinding | None) -> Shown:
 
 def _remarks(findings: Findings, before: ParameterFinding | None, after: ParameterFinding | None) -> str:
     def remark(one: ParameterFinding | None) -> str:
-        return "; ".join(part for part in (one.remark.text, far_text(findings, one)) if part) if one else ""
+        return "; ".join(part for part in (remark_text(one.remark), far_text(findings, one)) if part) if one else ""
 
     first, second = remark(before), remark(after)
     if first == second or not first or not before or not after:

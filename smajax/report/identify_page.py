@@ -10,10 +10,12 @@ import numpy as np
 
 from smajax.core.display_units import correlation, digits, display, label
 from smajax.core.files import json_text, replace
+from smajax.fit.directions import weak
 from smajax.fit.identify_result import Identified, IdentifiedOutput
 from smajax.report import identify_pictures as draw
 from smajax.report.csv_files import PARAMETERS, RUNS, identified_parameters, identified_runs
 from smajax.report.embedded import picture
+from smajax.report.identifiability_words import check_sentences, weak_combinations
 from smajax.report.identify_record import record
 from smajax.report.identify_words import answer, conclusions, estimate_rows, posterior_rows, prior_shown
 from smajax.report.next_steps import Step, after_identify, section
@@ -44,7 +46,7 @@ def _run_rows(result: Identified) -> tuple[list[str], list[list[str]]]:
 
 def _what_to_do(result: Identified) -> str:
     """About parameters of which the runs see one combination; empty where there are none."""
-    if not any("are correlated" in one for one in result.weak):
+    if not any(len(one.named) > 1 and not one.unbound for one in weak(result.directions)):
         return ""
     where = "such runs are ranked below" if result.suggestions else "<code>--design</code> ranks such runs"
     return (
@@ -128,7 +130,8 @@ def page(result: Identified, steps: Sequence[Step] = ()) -> str:
         "<h2>Parameters</h2>",
         table(head, rows, [k for k, title in enumerate(head) if title not in ("parameter", "unit", "remark")]),
         "<h2>Which combinations are identifiable</h2>",
-        bullets(result.weak) or f"<p>{KNOWN if result.all_took_part else KNOWN_OF_THE_REST}</p>",
+        bullets(weak_combinations(result.directions))
+        or f"<p>{KNOWN if result.all_took_part else KNOWN_OF_THE_REST}</p>",
         _what_to_do(result),
         _correlations(result),
     ]
@@ -183,7 +186,7 @@ def page(result: Identified, steps: Sequence[Step] = ()) -> str:
     parts += _run_parts(result)
     parts += [
         "<h2>Checks and provenance</h2>",
-        bullets(result.check),
+        bullets(check_sentences(result.warnings, result.checks)),
         table(["", ""], list(map(list, result.provenance.items()))),
         f"<p class=quiet>The same numbers: identify.json, {PARAMETERS}, {RUNS}.</p>",
     ]

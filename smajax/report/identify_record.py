@@ -8,7 +8,8 @@ import numpy as np
 
 from smajax.fit.identify_result import Identified
 from smajax.fit.posterior import Posterior
-from smajax.report.identify_words import conclusions, rms_by_role
+from smajax.report.identifiability_words import check_sentences, remark_text, weak_combinations
+from smajax.report.identify_words import conclusions, ended_sentence, rms_by_role
 
 
 def record(result: Identified) -> dict[str, Any]:
@@ -25,7 +26,7 @@ def record(result: Identified) -> dict[str, Any]:
                 "unit": one.unit,
                 "bounds": [one.lower, one.upper],
                 "start": one.start,
-                "remark": one.remark,
+                "remark": remark_text(one.note),
                 **(
                     {"prior": {"mean": k.mean, "sigma": k.sigma, "of_the_logarithm": k.logarithmic}}
                     if (k := one.prior)
@@ -40,10 +41,10 @@ def record(result: Identified) -> dict[str, Any]:
             for one in result.estimates
         },
         "correlation": {"parameters": list(result.correlated), "matrix": result.correlation.tolist()},
-        "weak_combinations": list(result.weak),
+        "weak_combinations": weak_combinations(result.directions),
         "fits": {
             "mean_square_over_noise": list(result.start_costs),
-            "stopped": result.stopped,
+            "stopped": ended_sentence(result.ended),
             "robust": result.robust,
         },
         "residual": {
@@ -84,7 +85,7 @@ def record(result: Identified) -> dict[str, Any]:
             for one in result.suggestions
         ],
         "presets": {"held": list(result.held_presets), "fitted": list(result.fitted_presets)},
-        "check": list(result.check),
+        "check": list(check_sentences(result.warnings, result.checks)),
         "provenance": result.provenance,
     }
 

@@ -11,9 +11,14 @@ from smajax.core.display_units import digits, display, label, p_value, with_erro
 from smajax.core.whiteness import WHITE
 from smajax.core.wording import and_listed, counted, times_noise
 from smajax.data.experiment.record import Prior
-from smajax.fit.identify_result import Estimate, Identified
+from smajax.fit.identify_result import Estimate, FitEnd, Identified
+from smajax.fit.levenberg_marquardt import Status
 from smajax.fit.posterior import Posterior
 from smajax.fit.uncertainty import clusters
+from smajax.report.identifiability_words import check_sentences as check_sentences
+from smajax.report.identifiability_words import direction_sentence as direction_sentence
+from smajax.report.identifiability_words import remark_text
+from smajax.report.identifiability_words import weak_combinations as weak_combinations
 from smajax.report.range_words import range_sentences
 
 FAR = 2.0  # standard deviations of what was known before, from which on an estimate contradicts it
@@ -86,7 +91,7 @@ def conclusions(result: Identified) -> list[str]:
     sentences = [
         *_held(result),
         *_determined(result),
-        result.stopped,
+        ended_sentence(result.ended),
         *(_error(result, k) for k in range(len(result.outputs))),
     ]
     given = [one.noise_before is None for one in result.outputs]
@@ -129,7 +134,7 @@ def conclusions(result: Identified) -> list[str]:
     if result.model is not None:
         sentences += range_sentences(result.model.values)
     sentences += [said for one in result.estimates if (said := _contradicted(one))]
-    edge = [one.name for one in result.estimates if "bound" in one.remark and one.standard_error is None]
+    edge = [one.name for one in result.estimates if one.note.at_bound and one.standard_error is None]
     not_identifiable = [one.name for one in result.estimates if one.standard_error is None and one.name not in edge]
     if edge:
         sentences.append(
@@ -148,6 +153,22 @@ def conclusions(result: Identified) -> list[str]:
     if result.robust:
         sentences.append("Huber's loss: samples far off count less, and errors are those of that estimate.")
     return sentences
+
+
+def ended_sentence(end: FitEnd) -> str:
+    """Why the fit ended, and how many starts came to the same."""
+    reason = {
+        Status.RUNNING: f"{end.most_steps} steps were not enough",
+        Status.CONVERGED: f"it has converged, no step lowers the cost by more than {end.tolerance:.0e} of it",
+        Status.NO_DESCENT: "it has converged, no step lowers the cost any more",
+        Status.NOT_FINITE: "the model gives no number at the start",
+        Status.NOTHING_FREE: "no parameter is free",
+        Status.EXCEEDED: "other fits were far better after as many steps",
+    }[end.status]
+    return (
+        f"The fit stopped after {end.steps} steps: {reason}. {end.same_cost} of the {end.fits} fits run until their end "
+        f"found the same least cost{'' if end.same_cost == end.fits else ', the others a higher one'}."
+    )
 
 
 def _times(result: Identified) -> str:
@@ -231,7 +252,7 @@ def estimate_rows(result: Identified) -> list[list[str]]:
                 *([interval(one)] if profiled else []),
                 bounds,
                 digits(unit.of(one.start)),
-                one.remark,
+                remark_text(one.note),
             ]
         )
     return rows

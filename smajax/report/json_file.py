@@ -21,6 +21,7 @@ from smajax.attribution.findings import (
     RunFinding,
     UnknownTerm,
 )
+from smajax.report.identifiability_words import remark_text
 from smajax.report.narrative import Narrative, narrate
 from smajax.report.narrative.rounds import chosen_text
 
@@ -85,7 +86,7 @@ def _parameter(result: ParameterFinding) -> dict[str, Any]:
         "lower": result.lower,
         "upper": result.upper,
         "start": result.start,
-        "remark": result.remark.text,
+        "remark": remark_text(result.remark),
         "prior_base": result.prior_base,
         "prior_deviation": result.prior_deviation,
     }

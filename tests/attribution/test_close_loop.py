@@ -166,7 +166,7 @@ def test_one_run_without_unknowns_and_candidates_still_gives_a_verdict(tmp_path:
     assert findings.fit_runs == 1
     assert "no candidate effect was to be tried" in narrate(findings).summary[0]
     assert not any(term.named for term in findings.unknown)
-    assert any("Nothing is declared unknown" in line for line in findings.check)
+    assert any("Nothing is declared unknown" in line for line in narrate(findings).check)
 
 
 def _change(time: np.ndarray, series: np.ndarray, start: float, end: float) -> float:

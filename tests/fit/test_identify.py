@@ -19,12 +19,14 @@ from smajax.data.experiment.record import Experiment
 from smajax.data.model_catalogue import CATALOGUE
 from smajax.data.readers.read import read_table
 from smajax.fit.design import candidate_runs
-from smajax.fit.directions import Direction, directions, weak_combinations
+from smajax.fit.directions import Direction, directions
 from smajax.fit.identify import identify
 from smajax.fit.identify_result import Identified
 from smajax.fit.robust import huber_weights
 from smajax.fit.sensitivity import Sensitivity
+from smajax.fit.uncertainty import RemarkKind
 from smajax.model.presets import build
+from smajax.report.identifiability_words import direction_sentence, weak_combinations
 from smajax.report.identify_page import page, write_identified
 from smajax.report.identify_record import record
 from smajax.report.identify_words import answer, conclusions
@@ -175,12 +177,12 @@ def test_the_step_of_a_temperature_does_not_depend_on_its_zero() -> None:
         one = directions(at, ("a", "start"), {"a": 1.0, "start": value}, 1.0, ["start"])[0]
         told = re.fullmatch(
             r"a and start are correlated: a change of a by (.*) % and start by (.*) K at the same time.*",
-            one.sentence(),
+            direction_sentence(one),
         )
         assert told is not None
         assert float(told[2]) == pytest.approx(0.2 * float(told[1]), rel=0.06)  # two digits each
     alone = Direction({"start": 1.0}, 0.1, frozenset({"start"}))
-    assert alone.sentence() == "start is known to 2 K only."
+    assert direction_sentence(alone) == "start is known to 2 K only."
 
 
 def test_the_suggested_run_adds_information(experiment: Experiment, found: Identified) -> None:
@@ -234,13 +236,14 @@ def test_the_page_has_a_column_of_profiles_where_one_was_drawn(found: Identified
 
 
 def test_the_page_gives_advice_for_correlated_parameters(found: Identified) -> None:
-    weak = ("a and b are correlated: a change of a by +3 % and b by -3 % at the same time is one standard error.",)
+    weak = (Direction({"a": 1.0, "b": -1.0}, 0.06),)
+    alone = (Direction({"a": 1.0, "b": 0.1}, 0.09),)
     advice = "measure one by itself and give it under <code>[model.parameters]</code>"
-    bare = dataclasses.replace(found, weak=weak, suggestions=())
+    bare = dataclasses.replace(found, directions=weak, suggestions=())
     assert f"{advice} in the place of" in page(bare)
     assert "<code>--design</code> ranks such runs" in page(bare)
-    assert "such runs are ranked below" in page(dataclasses.replace(found, weak=weak))
-    assert advice not in page(dataclasses.replace(found, weak=("a is known to 9 % only.",)))
+    assert "such runs are ranked below" in page(dataclasses.replace(found, directions=weak))
+    assert advice not in page(dataclasses.replace(found, directions=alone))
 
 
 def test_the_headline_counts_correlated_parameters_and_a_sentence_says_what_that_means(found: Identified) -> None:
@@ -303,7 +306,7 @@ def test_a_fit_at_the_bound_of_its_box_is_reported(tmp_path: Path) -> None:
     )
     assert strain.value == pytest.approx(0.04, rel=1e-3)
     assert strain.standard_error is None
-    assert "upper bound" in strain.remark
+    assert strain.note.kind is RemarkKind.UPPER_BOUND
 
 
 def test_the_command_reports_what_is_wrong(tmp_path: Path) -> None:
@@ -343,3 +346,15 @@ def test_a_value_that_the_file_does_not_give_may_be_fitted_too(tmp_path: Path, m
     assert abs(slope["value"] - 0.88 * preset) < 4.0 * slope["standard_error"]
     assert slope["standard_error"] < 0.05 * preset
     assert refused("identify", file, "--starts", "0", "--presets", "fitted", "--out", tmp_path / "held")
+
+
+def test_the_sentences_that_the_result_held_are_there_with_a_warning(found: Identified) -> None:
+    written = record(found)
+    with pytest.warns(DeprecationWarning, match=r"identified.stopped is smajax.report.narrate\(identified\).ended now"):
+        assert found.stopped == written["fits"]["stopped"]
+    with pytest.warns(DeprecationWarning, match="identified.check is"):
+        assert list(found.check) == written["check"]
+    with pytest.warns(DeprecationWarning, match="identified.weak is"):
+        assert list(found.weak) == written["weak_combinations"]
+    with pytest.warns(DeprecationWarning, match="estimate.remark is"):
+        assert [one.remark for one in found.estimates] == [one["remark"] for one in written["parameters"].values()]

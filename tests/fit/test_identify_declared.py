@@ -21,6 +21,7 @@ from smajax.fit.experiment_problem import declared_problem
 from smajax.fit.identify import identify
 from smajax.fit.identify_result import Estimate, Identified
 from smajax.fit.predicted import misfits
+from smajax.fit.uncertainty import RemarkKind
 from smajax.model.presets import build
 from smajax.report.identify_page import page
 from smajax.report.identify_record import record
@@ -212,7 +213,7 @@ def test_a_parameter_that_no_run_determines_has_the_error_of_its_prior(tmp_path:
     found = _by_name(_found(tmp_path, unknown_section() + silent + STRAIN + KNOWN))["convection_coefficient"]
     assert found.value == pytest.approx(120.0, rel=1e-3)
     assert found.standard_error == pytest.approx(24.0, rel=0.02)
-    assert "prior" in found.remark
+    assert found.note.kind is RemarkKind.PRIOR
 
 
 def test_an_initial_fraction_of_each_run_is_found_beside_a_fixed_parameter(tmp_path: Path) -> None:

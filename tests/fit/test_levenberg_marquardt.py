@@ -18,7 +18,7 @@ from smajax.fit.bounded_descent import (
     GainRatioSearch,
     bounded_quadratic_minimum,
 )
-from smajax.fit.directions import directions, weak_combinations
+from smajax.fit.directions import directions
 from smajax.fit.levenberg_marquardt import (
     MAX_DAMPING,
     MAX_STEPS,
@@ -35,6 +35,7 @@ from smajax.fit.levenberg_marquardt import (
 from smajax.fit.problem import FitTask
 from smajax.fit.robust import robust_variance
 from smajax.fit.sensitivity import Sensitivity
+from smajax.report.identifiability_words import weak_combinations
 from tests.helpers.often import often
 
 TOLERANCES = TOLERANCE, 0.0

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from smajax.fit.identifiability import identifiability
 from smajax.fit.sensitivity import Sensitivity
-from smajax.fit.uncertainty import RemarkKind, at_bound, identifiability, uncertainty
+from smajax.fit.uncertainty import Remark, RemarkKind, at_bound, uncertainty
 
 BOUNDS = dict.fromkeys("abc", (-10.0, 10.0))
 VALUES = dict.fromkeys("abc", 1.0)
@@ -24,7 +25,7 @@ def test_standard_errors_are_those_of_least_squares_when_the_residual_is_white()
     expected = np.sqrt(np.diag(np.linalg.inv(columns.T @ columns)))
     errors = np.asarray([found.standard_error[name] for name in "abc"], float)
     np.testing.assert_allclose(errors, expected, rtol=0.2)
-    assert not any(found.remark.values())
+    assert not any(found.remarks.values())
 
 
 def test_an_autocorrelated_residual_widens_the_errors() -> None:
@@ -50,7 +51,8 @@ def test_three_parameters_of_which_two_combinations_are_identifiable_have_no_sta
     columns[:, 2] = columns[:, 0] + columns[:, 1]
     found = uncertainty(_sensitivity(columns, rng.normal(size=500)), "abc", VALUES, BOUNDS)
     assert set(found.standard_error.values()) == {None}
-    assert all("combination" in found.remark[name] for name in "abc")
+    assert all(found.remarks[name].kind is RemarkKind.COMBINATION for name in "abc")
+    assert found.remarks["a"].others == ("b", "c")
 
 
 def test_a_parameter_without_influence_is_reported() -> None:
@@ -60,7 +62,7 @@ def test_a_parameter_without_influence_is_reported() -> None:
     found = uncertainty(at, "ab", VALUES, BOUNDS)
     assert found.standard_error["b"] is None
     assert found.standard_error["a"] is not None
-    assert any("b: nothing in these runs depends on it" in line for line in identifiability(at, "ab", BOUNDS))
+    assert identifiability(at, "ab", BOUNDS).without_effect == ("b",)
 
 
 def test_a_parameter_known_worse_than_its_range_has_no_standard_error() -> None:
@@ -68,7 +70,7 @@ def test_a_parameter_known_worse_than_its_range_has_no_standard_error() -> None:
     at = _sensitivity(rng.normal(size=(500, 2)) * [1.0, 1e-3], rng.normal(size=500))
     found = uncertainty(at, "ab", VALUES, BOUNDS)
     assert found.standard_error["b"] is None
-    assert "range undetermined" in found.remark["b"]
+    assert found.remarks["b"].kind is RemarkKind.RANGE_OPEN
 
 
 def test_a_parameter_on_its_bound_has_no_standard_error() -> None:
@@ -76,7 +78,7 @@ def test_a_parameter_on_its_bound_has_no_standard_error() -> None:
     at = _sensitivity(rng.normal(size=(500, 2)), rng.normal(size=500))
     found = uncertainty(at, "ab", {"a": 10.0, "b": 0.0}, BOUNDS)
     assert found.standard_error["a"] is None
-    assert found.remark["a"] == "at its upper bound"
+    assert found.remarks["a"].kind is RemarkKind.UPPER_BOUND
 
 
 def _estimates_with(covariance: np.ndarray, seed: int, samples: int = 4000) -> Sensitivity:
@@ -88,30 +90,24 @@ def _estimates_with(covariance: np.ndarray, seed: int, samples: int = 4000) -> S
     return Sensitivity(names, rng.normal(size=(1, samples)), jacobian[None], np.ones((1, samples)))
 
 
-def _correlated(at: Sensitivity) -> tuple[list[str], dict[str, str]]:
-    """(the lines of correlated parameters, remarks)."""
+def _groups(at: Sensitivity) -> tuple[dict[tuple[str, ...], float], dict[str, Remark]]:
+    """(largest correlation of each group of correlated parameters, remarks)."""
     bounds = dict.fromkeys(at.names, (-100.0, 100.0))
-    lines = identifiability(at, at.names, bounds)
-    remark = uncertainty(at, at.names, dict.fromkeys(at.names, 1.0), bounds).remark
-    return [line for line in lines if "are correlated" in line], remark
+    found = identifiability(at, at.names, bounds)
+    assert (found.rank, found.samples) == (len(at.names), 4000)
+    assert found.correlated is not None
+    remarks = uncertainty(at, at.names, dict.fromkeys(at.names, 1.0), bounds).remarks
+    return {one.names: one.most for one in found.correlated}, remarks
 
 
-def test_two_correlated_pairs_are_named_in_the_sentence_that_counts_what_is_identifiable() -> None:
+def test_two_correlated_pairs_are_found_with_their_correlations() -> None:
     covariance = np.eye(5)
     covariance[0, 1] = covariance[1, 0] = 0.995
     covariance[3, 4] = covariance[4, 3] = -0.9996
-    lines, remark = _correlated(_estimates_with(covariance, 7))
-    assert lines == [
-        "The 5 unknowns are identifiable from these runs (Jacobian of 4000 samples, rank 5), but not each by itself: "
-        "a and b are correlated (up to 0.995) and d and e are correlated (up to 0.999). Of each group fix one or measure runs that separate them."
-    ]
-    assert remark == {
-        "a": "correlated with b",
-        "b": "correlated with a",
-        "c": "",
-        "d": "correlated with e",
-        "e": "correlated with d",
-    }
+    groups, remarks = _groups(_estimates_with(covariance, 7))
+    assert groups == pytest.approx({("a", "b"): 0.995, ("d", "e"): 0.9996}, abs=1e-6)
+    others = {"a": ("b",), "b": ("a",), "d": ("e",), "e": ("d",)}
+    assert remarks == {"c": Remark(), **{name: Remark(RemarkKind.CORRELATED, one) for name, one in others.items()}}
 
 
 def test_groups_of_correlated_parameters_are_separated() -> None:
@@ -120,17 +116,15 @@ def test_groups_of_correlated_parameters_are_separated() -> None:
     bounds = dict.fromkeys(at.names, (-1e6, 1e6))
     found = uncertainty(at, at.names, dict.fromkeys(at.names, 1.0), bounds)
     assert found.correlated_groups == (("a", "b"), ("c", "d"))
-    assert found.remark["a"] == "correlated with b"
+    assert found.remarks["a"] == Remark(RemarkKind.CORRELATED, ("b",))
 
 
-def test_six_correlated_parameters_are_one_line_and_short_remarks() -> None:
-    lines, remark = _correlated(_estimates_with(0.01 * np.eye(6) + 0.99, 8))
-    assert lines == [
-        "The 6 unknowns are identifiable from these runs (Jacobian of 4000 samples, rank 6), but not each by itself: "
-        "a, b, c, d, e and f are correlated (up to 0.990). Fix one of them or measure runs that separate them."
-    ]
-    assert remark["a"] == "correlated with b and 4 others"
-    assert {remark[name] for name in "bcdef"} == {"correlated with a and 4 others"}
+def test_six_correlated_parameters_are_one_group() -> None:
+    groups, remarks = _groups(_estimates_with(0.01 * np.eye(6) + 0.99, 8))
+    assert groups == pytest.approx({tuple("abcdef"): 0.99}, abs=1e-6)
+    assert remarks == {
+        name: Remark(RemarkKind.CORRELATED, tuple(one for one in "abcdef" if one != name)) for name in "abcdef"
+    }
 
 
 def test_a_chain_is_one_group_though_its_ends_differ() -> None:
@@ -138,39 +132,28 @@ def test_a_chain_is_one_group_though_its_ends_differ() -> None:
     steps = np.tril(np.ones((4, 4))) * [1.0, 0.15, 0.15, 0.15]
     covariance = steps @ steps.T
     assert covariance[0, 3] / np.sqrt(covariance[3, 3]) < 0.98
-    lines, _ = _correlated(_estimates_with(covariance, 9))
-    assert len(lines) == 1
-    assert "not each by itself: a, b, c and d are correlated (up to " in lines[0]
+    groups, _ = _groups(_estimates_with(covariance, 9))
+    assert list(groups) == [tuple("abcd")]
 
 
-def test_correlations_beside_a_combination_without_effect_have_a_line_of_their_own() -> None:
-    """Where the count says already that something has to be fixed, it is not repeated there."""
+def test_correlations_beside_a_combination_without_effect_are_those_of_the_others() -> None:
     at = _estimates_with(np.asarray([[1.0, 0.995], [0.995, 1.0]]), 7)
     jacobian = np.concatenate([at.jacobian, np.zeros((1, at.jacobian.shape[1], 1))], axis=2)
-    lines = identifiability(Sensitivity(("a", "b", "c"), at.misfit, jacobian, at.mask), "abc", BOUNDS)
-    assert lines[0].startswith("Only 2 combinations are identifiable")
-    assert lines[-1] == "a and b are correlated (up to 0.995): fix one of them or measure runs that separate them."
+    found = identifiability(Sensitivity(("a", "b", "c"), at.misfit, jacobian, at.mask), "abc", BOUNDS)
+    assert (found.rank, found.without_effect) == (2, ("c",))
+    assert found.correlated is not None
+    (group,) = found.correlated
+    assert group.names == ("a", "b")
+    assert group.most == pytest.approx(0.995, abs=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("names", "rank", "sentence"),
-    [
-        ("a", 0, "No unknown is identifiable from these runs (Jacobian of 500 samples, rank 0)."),
-        ("a", 1, "The one unknown is identifiable from these runs (Jacobian of 500 samples, rank 1)."),
-        ("ab", 2, "All 2 unknowns are identifiable from these runs (Jacobian of 500 samples, rank 2)."),
-        (
-            "abc",
-            2,
-            "Only 2 combinations are identifiable of the 3 unknowns from these runs (Jacobian of 500 samples, rank 2)",
-        ),
-    ],
-)
-def test_the_number_of_identifiable_unknowns_is_reported_first(names: str, rank: int, sentence: str) -> None:
+@pytest.mark.parametrize(("names", "rank"), [("a", 0), ("a", 1), ("ab", 2), ("abc", 2)])
+def test_the_number_of_identifiable_unknowns_is_the_rank(names: str, rank: int) -> None:
     rng = np.random.default_rng(3)
     columns = rng.normal(size=(500, rank)) @ np.eye(rank, len(names))
     columns[:, rank:] = columns[:, :1] if rank else 0.0
-    line = identifiability(_sensitivity(columns, rng.normal(size=500)), names, BOUNDS)[0]
-    assert line.startswith(sentence)
+    found = identifiability(_sensitivity(columns, rng.normal(size=500)), names, BOUNDS)
+    assert (found.unknowns, found.rank, found.samples) == (tuple(names), rank, 500)
 
 
 def test_a_weak_parameter_within_a_degeneracy_has_no_error_either() -> None:

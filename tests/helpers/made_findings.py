@@ -19,6 +19,7 @@ from smajax.attribution.findings import (
     RunFinding,
     Verdict,
 )
+from smajax.fit.identifiability import Checks, Identifiability
 from smajax.fit.integration import IntegrationError
 from smajax.fit.uncertainty import Remark, RemarkKind
 
@@ -125,7 +126,8 @@ def made_findings() -> Findings:
         title="Dead weight, 75 g",
         source="latent/experiment.toml",
         verdict=Verdict.EXPLAINED,
-        check=("3 runs, 2 to fit and 1 held out; 1200 samples each at 20 Hz.",),
+        warnings=("3 runs, 2 to fit and 1 held out; 1200 samples each at 20 Hz.",),
+        checks=Checks(Identifiability(("convection_coefficient", "stress_slope_austenite"), 2400, 2, correlated=())),
         output_name="position",
         output_unit="m",
         noise_sigma=NOISE,

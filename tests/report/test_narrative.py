@@ -31,8 +31,9 @@ from smajax.attribution.findings import (
 )
 from smajax.attribution.record_error import OutlierRun
 from smajax.attribution.unknown.terms import UNKNOWN
-from smajax.core.progress import Event, Message, Result, Stage
+from smajax.core.progress import Event, Message, Result, Stage, WarningMessage
 from smajax.data.model_file.of_presets import model_of_presets
+from smajax.fit.identifiability import Checks, Identifiability
 from smajax.fit.integration import IntegrationError
 from smajax.fit.uncertainty import Remark, RemarkKind
 from smajax.report.html import findings_to_html
@@ -305,6 +306,19 @@ def test_progress_of_the_search_is_a_message() -> None:
     assert events == [
         Stage("fitting", 0.5),
         Message("round 2: without creep; set aside: without a what the base model leaves is noise"),
+    ]
+
+
+def test_the_checks_before_a_fit_are_messages_and_a_prior_without_use_is_a_warning() -> None:
+    events: list[Event] = []
+    found = Identifiability(("a", "b"), 500, 2)
+    narrated(events.append)(Result(Checks(found, unused_priors=True, held_presets=("c",))))
+    assert [type(one) for one in events] == [WarningMessage, Message, Message]
+    assert [one.text for one in events if isinstance(one, Message)] == [
+        "check: All 2 unknowns are identifiable from these runs (Jacobian of 500 samples, rank 2), each by itself as far as the correlations at "
+        "the fit allow.",
+        "check: The file does not give c: held at the values of the presets, or at the base that [priors.presets] has. `--presets fitted` fits them "
+        "too, within what data sheets leave open, as close-loop does.",
     ]
 
 

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 import typer
 
+from smajax.attribution.findings import Remaining
 from smajax.cli.main import app
 from smajax.control.run_request import RunRequest, run_open
 from smajax.data.model_file.of_presets import model_of_presets
@@ -54,7 +55,7 @@ def test_the_commands_of_a_fitted_model_are_read_and_name_its_files() -> None:
     assert found["identify"]["experiment"] == Path("my bench/experiment.toml")
     assert found["identify"]["design"] is True
     assert "close-loop" not in found
-    stopped = dataclasses.replace(findings, remaining="the checks")
+    stopped = dataclasses.replace(findings, remaining=Remaining.CHECKS)
     first = read(next_steps.after_close_loop(stopped, FOLDER, "my bench/experiment.toml"))[0]
     assert (first["command"], first["experiment"], first["out"]) == (
         "close-loop",

@@ -89,6 +89,7 @@ def identify_command(
     from smajax.fit.uncertain_presets import with_uncertain_presets
     from smajax.report.identify_page import write_identified
     from smajax.report.identify_record import record
+    from smajax.report.narrative import narrated
 
     check_path(out)
     loaded = load_experiment(experiment, CATALOGUE)
@@ -119,7 +120,7 @@ def identify_command(
                 design=design,
                 draws=posterior,
                 memory=out / "fits",
-                progress=progress,
+                progress=narrated(progress),
                 command=command,
             )
             page = write_identified(identified, out, loaded.path)
@@ -138,10 +139,10 @@ def identify_command(
 
 def _print(identified: Identified) -> None:
     """The result for a terminal."""
-    from smajax.report.identify_words import answer, conclusions, estimate_rows, posterior_rows
+    from smajax.report.identify_words import answer, conclusions, estimate_rows, posterior_rows, weak_combinations
 
     typer.echo(f"\n{identified.title or identified.experiment}")
-    for sentence in [answer(identified), *conclusions(identified), *identified.weak]:
+    for sentence in [answer(identified), *conclusions(identified), *weak_combinations(identified.directions)]:
         typer.echo(f"  {sentence}")
     rows = estimate_rows(identified)
     width = max(28, *(len(row[0]) for row in rows))

@@ -1,7 +1,7 @@
 """Findings in words: what the numbers allow, and nothing beyond.
 
-In: `smajax.attribution.findings.Findings`, numbers and enums. Out: a `Narrative`, sentences for the page, the record and the
-terminal; `narrated` does the same for the rounds of a search while it runs. Nothing here computes a result: thresholds
+In: `smajax.attribution.findings.Findings`, or what `identify` gives: numbers and enums. Out: a `Narrative`, sentences for the page, the record and the
+terminal; `narrated` does the same for the checks before a fit and the rounds of a search while it runs. Nothing here computes a result: thresholds
 are those of `findings.config`, and each module writes one part. `verdict` has the summary and `caveats` what is to be
 minded; `limits` what the runs do not determine; `priors` those of the experiment file; `residual`, `rounds` and `unknown` the parts of the same name.
 """
@@ -9,10 +9,15 @@ minded; `limits` what the runs do not determine; `priors` those of the experimen
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import overload
 
 from smajax.attribution.findings import Findings, Round
 from smajax.core.progress import Event, Message, Progress, Result
+from smajax.fit.identifiability import Checks
+from smajax.fit.identify_result import Identified
 from smajax.model.effects.library import LIBRARY
+from smajax.report.identifiability_words import check_events, check_sentences
+from smajax.report.narrative.identification import IdentificationNarrative, of_identified
 from smajax.report.narrative.limits import cannot_know
 from smajax.report.narrative.priors import of_priors
 from smajax.report.narrative.residual import residual_sentences, unexplained
@@ -40,13 +45,23 @@ class Narrative:
     effects: dict[str, str]  # what each candidate would mean, by its name
 
 
-def narrate(findings: Findings) -> Narrative:
-    """The whole report in sentences."""
+@overload
+def narrate(findings: Findings) -> Narrative: ...
+
+
+@overload
+def narrate(findings: Identified) -> IdentificationNarrative: ...
+
+
+def narrate(findings: Findings | Identified) -> Narrative | IdentificationNarrative:
+    """The whole report in sentences: of `close_loop`'s findings, or of what `identify` gives."""
+    if isinstance(findings, Identified):
+        return of_identified(findings)
     return Narrative(
         summary=summary(findings),
         unexplained=unexplained(findings),
         cannot_know=cannot_know(findings),
-        check=(*findings.check, *of_priors(findings)),
+        check=(*check_sentences(findings.warnings, findings.checks), *of_priors(findings)),
         residual_before=residual_sentences(findings.residual_before),
         residual_after=residual_sentences(findings.residual_after),
         rounds=tuple(
@@ -62,18 +77,21 @@ def narrate(findings: Findings) -> Narrative:
     )
 
 
-def narrated(progress: Progress, unit: str, quantity: str) -> Progress:
-    """`progress` that gets each round of a search as a message; `unit` (SI) and `quantity` of the output."""
+def narrated(progress: Progress, unit: str = "-", quantity: str = "") -> Progress:
+    """`progress` that gets the checks before a fit and each round of a search in words; `unit` (SI) and `quantity` of the output that a search explains."""
 
     def in_words(event: Event) -> None:
         if isinstance(event, Result) and isinstance(event.record, Round):
             done = event.record
             text = chosen_text(done) or "nothing added"
             progress(Message(f"round {done.number}: {text}; {reason_text(done.reason, unit, quantity, LISTED)}"))
+        elif isinstance(event, Result) and isinstance(event.record, Checks):
+            for one in check_events(event.record):
+                progress(one)
         else:
             progress(event)
 
     return in_words
 
 
-__all__ = ["Narrative", "error_text", "narrate", "narrated"]
+__all__ = ["IdentificationNarrative", "Narrative", "error_text", "narrate", "narrated"]

@@ -11,6 +11,7 @@ from smajax.attribution.paired_errors import Comparison, runs_compared
 from smajax.attribution.record_error import OutlierRun
 from smajax.core.display_units import digits
 from smajax.core.wording import and_listed
+from smajax.report.identifiability_words import remark_text
 from smajax.report.narrative.values import assumed_text, error_text, far_text, value_text
 
 NAMED_SIZES = 4  # in a sentence
@@ -102,7 +103,8 @@ def of_bounds(findings: Findings) -> Iterator[str]:
     own = [one for one in limited if not one.name.startswith(added) and not far_text(findings, one)]
     if own:
         ends = [
-            f"{one.name} ends {one.remark.text} of {value_text(one.value, one.unit, one.name).strip()}" for one in own
+            f"{one.name} ends {remark_text(one.remark)} of {value_text(one.value, one.unit, one.name).strip()}"
+            for one in own
         ]
         its = "its bounds" if len(own) == 1 else "their bounds"
         yield (

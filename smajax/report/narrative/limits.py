@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from smajax.attribution.findings import Findings
 from smajax.core.wording import and_listed
 from smajax.fit.uncertainty import RemarkKind
+from smajax.report.identifiability_words import remark_text
 from smajax.report.narrative.values import assumed_text, error_text
 
 
@@ -59,7 +60,7 @@ def _remarks(findings: Findings) -> Iterator[str]:
     for one in findings.after:
         if one.remark and one.name not in known:
             measured = one.standard_error is not None
-            yield f"{one.name}: {one.remark.text}" + (
+            yield f"{one.name}: {remark_text(one.remark)}" + (
                 ": known less well than alone." if measured else "; its value is not measured by these runs."
             )
     blended = [one.name for one in findings.after if one.remark.kind is RemarkKind.COMBINATION]

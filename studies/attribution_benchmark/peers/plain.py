@@ -6,7 +6,7 @@ import time as clock
 
 import numpy as np
 
-from smajax.fit.levenberg_marquardt import Fit
+from smajax.fit.levenberg_marquardt import Fit, Status
 from studies.attribution_benchmark.peers.answer import Answer
 from studies.attribution_benchmark.peers.bench import Bench
 
@@ -30,4 +30,4 @@ def fit_of(bench: Bench, base: Answer) -> Fit:
     """The fit that `refitted` reports."""
     known = base.values or {}
     cost = base.fit_error**2 * float(np.asarray(bench.fits.problem.batch.mask).sum())
-    return Fit(np.asarray([known[name] for name in bench.fits.problem.names]), cost, True, "", 0)
+    return Fit(np.asarray([known[name] for name in bench.fits.problem.names]), cost, True, Status.CONVERGED, 0)
