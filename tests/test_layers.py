@@ -34,9 +34,9 @@ EXCEPTIONS = {
         "smajax",
     ): "findings.summary and its like are smajax.report.narrate(findings) now; until version 0.3",
     (
-        "smajax.fit.old_words",
-        "smajax.report.identify_words",
-    ): "sentences that results of identify held are the report's now; until version 0.3",
+        "smajax.core.old_words",
+        "smajax.report.old_words",
+    ): "sentences that results held are the report's now; until version 0.3",
 }
 
 MODULES = modules_in(PACKAGE)

@@ -20,6 +20,7 @@ from smajax.cli.options import refused, texts
 if TYPE_CHECKING:
     from smajax.control.plants import Plants
     from smajax.control.position_unit import PositionUnit
+    from smajax.control.run_notes import LimitOfFitRuns
     from smajax.data.model_file.actuator_model import ActuatorModel
     from smajax.model.system import System
     from smajax.report.next_steps import PlantWords
@@ -137,13 +138,15 @@ class PlantOptions:
 
         Raises typer.BadParameter for presets there are not, or some without the others; ExperimentError of --model.
         """
-        system, sentence = self._made(limit, True)
-        if sentence and said:
-            typer.echo(sentence, err=True)
+        from smajax.report.loop_words import source_sentence
+
+        system, of_runs = self._made(limit, True)
+        if of_runs is not None and said:
+            typer.echo(source_sentence(of_runs), err=True)
         return system
 
-    def _made(self, limit: float | None, limited: bool) -> tuple[System, str]:
-        """(the plant; a sentence on its limit, or "")."""
+    def _made(self, limit: float | None, limited: bool) -> tuple[System, LimitOfFitRuns | None]:
+        """(the plant; its limit where it is that of the model's runs)."""
         from smajax.control.compose import compose, with_values
         from smajax.control.model_as_plant import gives_limit, plant_of, with_limit
         from smajax.model.rigs import arm
@@ -157,7 +160,9 @@ class PlantOptions:
         changed = self._changed
         try:
             if self.kept is not None:
-                return plant_of(self.kept, changed, limit) if limited else (with_values(self.kept.system, changed), "")
+                return (
+                    plant_of(self.kept, changed, limit) if limited else (with_values(self.kept.system, changed), None)
+                )
             if missing:
                 system = with_values(arm(self.law) if self.law else arm(), changed)
             else:
@@ -166,7 +171,7 @@ class PlantOptions:
             raise typer.BadParameter(error.args[0]) from None
         except ValueError as error:
             raise typer.BadParameter(str(error), param_hint="--set" if changed else None) from None
-        return system if gives_limit(changed) else with_limit(system, limit), ""
+        return system if gives_limit(changed) else with_limit(system, limit), None
 
     @property
     def gives_limit(self) -> bool:
@@ -179,12 +184,14 @@ class PlantOptions:
         """(noise of the readings in the unit shown: that of --noise, else that of the model's file, else none; a sentence on the second)."""
         from smajax.cli.loop_options import noise_option
         from smajax.control.model_as_plant import noise_of_file
+        from smajax.report.loop_words import source_sentence
 
         typed = noise_option(text, unit)
         if typed is not None:
             return typed, ""
-        own, sentence = noise_of_file(self.kept)
-        return float(f"{float(unit.of(own)):.6g}"), sentence
+        source = noise_of_file(self.kept)
+        own = 0.0 if source is None else source.noise
+        return float(f"{float(unit.of(own)):.6g}"), source_sentence(source)
 
 
 @dataclass(frozen=True)

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeGuard
 
 from smajax.control.load_equation import moving_load
 from smajax.control.presets import FILTERS
-from smajax.core.display_units import digits, display
 from smajax.core.names import close_matches
-from smajax.core.wording import and_listed, counted
+from smajax.core.wording import and_listed
 from smajax.model.system import System
 
 PERIOD = 0.01  # s, where nobody says another
@@ -41,26 +40,6 @@ class LoopSettings:
             "noise": _with_unit(self.noise, self.position_unit),
         }
         return {name: one for name, one in whole.items() if one is not None}
-
-    def words(self) -> str:
-        """`the command up to 6 V, a control period of 10 ms`; "" of nothing known. The noise is the plant's, and left out."""
-        parts = []
-        if self.command_limit is not None:
-            parts.append(f"the command up to {digits(self.command_limit, 4)} {self.command_unit}")
-        if self.period is not None:
-            parts.append(f"a control period of {1e3 * self.period:g} ms")
-        if self.delay:
-            parts.append(f"a delay of {counted(self.delay, 'period')}")
-        if self.estimator:
-            parts.append(f"the filter `{self.estimator}`")
-        return and_listed(parts) if parts else ""
-
-    def noise_words(self) -> str:
-        """`0.1 mm of noise`, or `no noise`."""
-        if not self.noise:
-            return "no noise"
-        shown = display(self.position_unit)
-        return f"{digits(shown.of(self.noise), 3)} {shown.unit} of noise"
 
 
 NOT_KNOWN = LoopSettings()
@@ -163,25 +142,3 @@ def joined(
         value = own if own is not None else next(iter(said.values()), None)
         chosen |= {} if value is None else {name: value}
     return otherwise._replace(**chosen)
-
-
-def sentences(
-    files: Mapping[str, tuple[LoopSettings, Mapping[str, float]]], given: LoopSettings, own: LoopSettings
-) -> Iterator[str]:
-    """Of each file of gains what the loop takes from it, and what it means where the file is older and says nothing.
-
-    files: controller -> (its loop, its parameters that were not tuned, SI). given: by options, which go first. own: those of the loop that runs.
-    """
-    for controller, (loop, fixed) in files.items():
-        if loop == NOT_KNOWN and not fixed:
-            yield (
-                f"The gains of {controller} are from a file that says neither limit, filter nor control period (an older version, or written "
-                f"by hand): those of this plant and of the options hold, {own.words()}."
-            )
-            continue
-        over: dict[str, Any] = {name: None for name in OPTIONS if getattr(given, name) is not None}
-        taken = replace(loop, **over)
-        others = [f"{name} {digits(value, 4)}" for name, value in fixed.items()]
-        words = [one for one in (taken.words(), *others) if one]
-        if words:
-            yield f"As in the file of the gains of {controller}: {', '.join(words)}."

@@ -11,7 +11,7 @@ import numpy as np
 from smajax.control.compose import with_values
 from smajax.control.loop_settings import LIMIT_PARAMETER
 from smajax.control.presets import CONTROLLERS
-from smajax.core.display_units import digits, display
+from smajax.control.run_notes import LimitOfFitRuns, NoiseOfModelFile
 from smajax.core.parameters import get_parameters, parameter_values, parameters, set_parameters
 from smajax.data.model_file.record import ModelRecord
 from smajax.model.extended import with_effects
@@ -20,26 +20,21 @@ from smajax.model.system import System
 
 def plant_of(
     model: ModelRecord, changed: Mapping[str, str | float] | None = None, limit: float | None = None
-) -> tuple[System, str]:
-    """(the model's system with the values in `changed`; a sentence on the limit of its command, "" where it is its own).
+) -> tuple[System, LimitOfFitRuns | None]:
+    """(the model's system with the values in `changed`; the limit of its command, None where it is its own or was given).
 
     Where nobody gave the limit of a voltage amplifier it is a preset's, which no bench has: `limit` takes its place, in the command's
     unit, or by default the largest command of the fit runs, since beyond it the model extrapolates. Other drives have no limit.
     """
     system = with_values(model.system, changed or {})
     if gives_limit(changed or {}):
-        return system, ""
+        return system, None
     if limit is not None:
-        return with_limit(system, limit), ""
+        return with_limit(system, limit), None
     largest = largest_fitted(model)
     if largest is None:
-        return system, ""
-    name, unit = system.drive.command
-    sentence = (
-        f"The {name} is limited to {digits(largest, 4)} {unit}, the largest of the runs that the model was fitted to; give "
-        f"{LIMIT_PARAMETER} in the model file or with --set for another limit."
-    )
-    return with_limit(system, largest), sentence
+        return system, None
+    return with_limit(system, largest), LimitOfFitRuns(*system.drive.command, largest)
 
 
 def gives_limit(changed: Iterable[str]) -> bool:
@@ -70,20 +65,13 @@ def largest_fitted(model: ModelRecord) -> float | None:
     return largest if 0.0 < model.values["amplifier_gain"] * largest < known.value else None
 
 
-def noise_of_file(model: ModelRecord | None) -> tuple[float, str]:
-    """(standard deviation of a sample of the position's sensor as the model's file has it, rad or m; a sentence on it). Zero where it has none."""
+def noise_of_file(model: ModelRecord | None) -> NoiseOfModelFile | None:
+    """That of a sample of the position's sensor as the model's file has it; None where it has none."""
     if model is None:
-        return 0.0, ""
+        return None
     name, unit = model.system.load.reading
     noise = next((one.noise for one in model.outputs if (one.name, one.unit) == (name, unit)), 0.0)
-    if not noise:
-        return 0.0, ""
-    shown = display(unit, name)
-    said = f"{digits(shown.of(noise), 3)} {shown.unit}"
-    return (
-        noise,
-        f"The sensor has the noise of the model file, {said} (1 sigma); --noise gives another one, --noise 0 none.",
-    )
+    return NoiseOfModelFile(noise, name, unit) if noise else None
 
 
 def true_plant(model: ModelRecord, changed: Mapping[str, str | float], assumed: System, controller: str) -> System:

@@ -22,15 +22,27 @@ from smajax.control.figures_of_merit import SetPointMerit, merit_by_set_point, s
 from smajax.control.gains_file import Gains, read_gains
 from smajax.control.interface import between_in_words, check_interface, check_set_points, interface_of, noise_of
 from smajax.control.loop_dataset import labelled_loop
-from smajax.control.loop_settings import LoopInUse, LoopSettings, joined, sentences, settings_of
+from smajax.control.loop_settings import LoopInUse, LoopSettings, joined, settings_of
 from smajax.control.model_as_plant import gives_limit, noise_of_file, plant_of, true_plant, with_limit
 from smajax.control.position_unit import PositionUnit, unit_of
 from smajax.control.presets import CONTROLLERS, check_controller
 from smajax.control.reach import reach_of, reach_sentence
 from smajax.control.reference import resting
+from smajax.control.run_notes import (
+    MOST_SET_POINTS,
+    AboveMelting,
+    InputLeftOut,
+    LimitOfFitRuns,
+    NoiseOfModelFile,
+    Note,
+    NotFinite,
+    PresetGains,
+    Source,
+    TooManySetPoints,
+    gains_of_files,
+)
 from smajax.control.run_result import RunResult, mismatches
 from smajax.control.scales import is_arm
-from smajax.core.display_units import digits
 from smajax.core.names import close_matches
 from smajax.core.parameters import parameter_values
 from smajax.core.wording import and_listed
@@ -43,8 +55,6 @@ from smajax.model.system import System
 from smajax.simulation.dataset import simulate_dataset
 from smajax.simulation.integration_error import AUTO, Tolerance
 from smajax.simulation.simulate import DEFAULT_STEP
-
-MOST_RESTS = 50  # set points; more are a ramp or a sine of a file
 
 
 class RequestError(ValueError):
@@ -89,26 +99,25 @@ class RunRequest:
         with _part("values"):
             return with_values(bare, self.values)
 
-    def plant(self, limit: float | None = None) -> tuple[System, str]:
-        """(the model of a closed loop, whose command has this limit, or that of the model file; a sentence on the latter). Raises as `system`.
+    def plant(self, limit: float | None = None) -> tuple[System, LimitOfFitRuns | None]:
+        """(the model of a closed loop, whose command has this limit; that of the model file's runs, where it holds). Raises as `system`.
 
         A limit among the `values` goes first.
         """
         if self.model is None:
             system = self.system()
-            return system if gives_limit(self.values) else with_limit(system, limit), ""
+            return system if gives_limit(self.values) else with_limit(system, limit), None
         with _part("values"):
             return plant_of(self.model, self.values, limit)
 
-    def inputs_left_out(self) -> list[str]:
-        """A sentence for each input that the logs of a kept model had, and that this run leaves to a parameter."""
+    def inputs_left_out(self) -> list[InputLeftOut]:
+        """Each input that the logs of a kept model had, and that this run leaves to a parameter."""
         if self.model is None:
             return []
         kept = self.model
         replaced = {channel: name for name, channel in REPLACED.items()}
         return [
-            f"The model was fitted to runs with their own {channel}, {digits(low, 4)} to {digits(high, 4)} {INPUT_UNITS[channel]}; here it is "
-            f"{replaced[channel]}, {digits(kept.values[replaced[channel]], 4)}. Give --input {channel}=... for another."
+            InputLeftOut(channel, INPUT_UNITS[channel], (low, high), replaced[channel], kept.values[replaced[channel]])
             for channel, (low, high) in kept.fitted_range.items()
             if channel in replaced
             and channel not in self.inputs
@@ -152,13 +161,11 @@ def _unit(name: str) -> str:
     return "N m" if name == "load_torque" else INPUT_UNITS[name]
 
 
-def _notes(data: xr.Dataset) -> list[str]:
-    wrong = [str(name) for name in data.data_vars if not np.isfinite(data[name].to_numpy()).all()]
-    notes = [f"Values that are not finite in {', '.join(wrong)}: is the heat or the step too large?"] if wrong else []
+def _notes(data: xr.Dataset) -> list[Note]:
+    wrong = tuple(str(name) for name in data.data_vars if not np.isfinite(data[name].to_numpy()).all())
+    notes: list[Note] = [NotFinite(wrong)] if wrong else []
     hottest = float(data["temperature"].max())
-    if hottest > MELTS:
-        notes.append(f"The wire reaches {hottest:.4g} degC, and it melts at {MELTS:g} degC: is the input's unit right?")
-    return notes
+    return [*notes, AboveMelting(hottest)] if hottest > MELTS else notes
 
 
 def _check_inputs(request: RunRequest, required: frozenset[str], optional: frozenset[str]) -> None:
@@ -222,7 +229,7 @@ def _with_measured(request: RunRequest, system: System, data: xr.Dataset) -> xr.
     return data
 
 
-def _set_point_notes(system: System, position: np.ndarray) -> list[str]:
+def _set_point_notes(system: System, position: np.ndarray) -> list[Note]:
     """A note on a set point beyond the stops of the load."""
     try:
         check_set_points(system, unit_of(system).of(np.unique([position.min(), position.max()])).tolist())
@@ -232,13 +239,13 @@ def _set_point_notes(system: System, position: np.ndarray) -> list[str]:
 
 
 class _Assumed(NamedTuple):
-    """What the controller is told: its model, its gains, the loop that it is in, and sentences on where these come from."""
+    """What the controller is told: its model, its gains, the loop that it is in, and where these come from."""
 
     system: System
     gains: Gains
     loop: LoopInUse
     noise: float  # of the sensor, rad or m
-    sentences: tuple[str, ...]
+    sources: tuple[Source, ...]
 
 
 def _assumed(request: RunRequest, loop: LoopRequest) -> _Assumed:
@@ -252,35 +259,28 @@ def _assumed(request: RunRequest, loop: LoopRequest) -> _Assumed:
     check_controller(gains.controller, bare)
     gains = gains.without_limit() if gives_limit(request.values) else gains
     merged = joined({gains.controller: gains.loop}, loop.given)
-    system, sentence = request.plant(merged.command_limit)
+    system, limit = request.plant(merged.command_limit)
     system = CONTROLLERS[gains.controller].plant(system)
     with _part("noise"):
         noise, source = _noise(request, loop, system)
     own = settings_of(system, merged, noise)
-    said = [sentence, source]
-    if loop.gains is None:
-        said.append(_of_preset(gains.controller, system))
-    else:
-        said += sentences({gains.controller: (gains.loop, gains.fixed)}, loop.given, own)
-    return _Assumed(system, gains, merged, noise, tuple(one for one in said if one))
-
-
-def _of_preset(controller: str, system: System) -> str:
-    """Whose gains a loop without a file of gains has."""
-    scaled = "" if is_arm(system) else ", scaled from the arm to this load's stroke, force and time"
-    return (
-        f"No gains file: the gains are those of the preset of {controller}{scaled}, and not tuned on this plant; `smajax tune {controller}` "
-        "tunes them, and --gains takes its gains.json."
+    of_gains = (
+        [PresetGains(gains.controller, not is_arm(system))]
+        if loop.gains is None
+        else gains_of_files({gains.controller: (gains.loop, gains.fixed)}, loop.given, own)
     )
+    sources = limit, source, *of_gains
+    return _Assumed(system, gains, merged, noise, tuple(one for one in sources if one is not None))
 
 
-def _noise(request: RunRequest, loop: LoopRequest, system: System) -> tuple[float, str]:
-    """(standard deviation of the reading, rad or m; a sentence where it is that of the plant's model file)."""
+def _noise(request: RunRequest, loop: LoopRequest, system: System) -> tuple[float, NoiseOfModelFile | None]:
+    """(standard deviation of the reading, rad or m; that of the plant's model file where it is that)."""
     if loop.noise is not None:
         unit = unit_of(system)
-        return float(unit.to_own(noise_of(loop.noise, unit))), ""
+        return float(unit.to_own(noise_of(loop.noise, unit))), None
     model = request.model if loop.plant is None else loop.plant
-    return noise_of_file(model)
+    source = noise_of_file(model)
+    return 0.0 if source is None else source.noise, source
 
 
 def _set_points(
@@ -304,7 +304,7 @@ MEASURED = "measured_"  # before the name of a sensor: the variable of its log
 
 def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
     """The closed loop. Raises as `run_open`, and GainsFileError."""
-    assumed, gains, own, sigma, said = _assumed(request, loop)
+    assumed, gains, own, sigma, sources = _assumed(request, loop)
     with _part("mismatch" if loop.plant is None else "plant"):
         plant = (
             with_values(assumed, loop.mismatch)
@@ -351,12 +351,10 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
     if np.ptp(position) > 0.0:
         figures = {}  # they are those of one set point from the start of the run
         count = len(set_point_spans(position))
-        if count <= MOST_RESTS:
+        if count <= MOST_SET_POINTS:
             by_set_point = merit_by_set_point(run, plant)
         else:
-            notes.append(
-                f"Figures of merit are for constant set points, {MOST_RESTS} at most: this reference has {count}."
-            )
+            notes.append(TooManySetPoints(count))
     notes += _set_point_notes(assumed, position) or _reach_notes(setup, position, figures, by_set_point)
     return RunResult(
         data=data,
@@ -365,7 +363,7 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
         notes=tuple(notes),
         by_set_point=by_set_point,
         mismatches=mismatches(assumed, plant),
-        settings=said,
+        settings=sources,
         loop=settings_of(assumed, own, sigma),
         controller=controller,
     )
@@ -373,7 +371,7 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
 
 def _reach_notes(
     setup: ClosedLoopSetup, position: np.ndarray, figures: Mapping[str, float], by_set_point: Sequence[SetPointMerit]
-) -> list[str]:
+) -> list[Note]:
     """A note on set points where the loop does not settle, and which no controller could reach."""
     missed = [one.set_point for one in by_set_point if not np.isfinite(one.merit.settling_time)]
     if figures and not math.isfinite(figures["settling_time"]):

@@ -11,6 +11,7 @@ import xarray as xr
 from smajax.control.controllers.base import AbstractController
 from smajax.control.figures_of_merit import SetPointMerit
 from smajax.control.loop_settings import LoopSettings
+from smajax.control.run_notes import Note, Source
 from smajax.core.parameters import parameter_values, parameters
 from smajax.model.effects.library import LIBRARY
 from smajax.model.extended import with_effects
@@ -39,10 +40,10 @@ class RunResult:
     data: xr.Dataset
     system: System
     merit: Mapping[str, float]
-    notes: tuple[str, ...]
+    notes: tuple[Note, ...]
     by_set_point: tuple[SetPointMerit, ...] = ()  # figures of merit by set point, where there are several
     mismatches: tuple[Mismatch, ...] = ()
-    settings: tuple[str, ...] = ()  # sentences on what a closed loop takes from files of gains and of models
+    settings: tuple[Source, ...] = ()  # what a closed loop takes from files of gains and of models
     loop: LoopSettings | None = None  # of a closed loop: limit of the command, period, delay, filter, noise
     controller: AbstractController | None = None
 

@@ -66,6 +66,16 @@ class TunedOnModel:
 
 
 @dataclass(frozen=True)
+class OtherValue:
+    """A value that is given in the models, and another in the plant; SI."""
+
+    name: str
+    model: float
+    plant: float
+    unit: str
+
+
+@dataclass(frozen=True)
 class ControlComparison:
     """Gains tuned on several models, evaluated on one plant."""
 
@@ -74,9 +84,7 @@ class ControlComparison:
     unit: PositionUnit
     seconds: float  # length of a loop
     tuned: tuple[TunedOnModel, ...]
-    differs: tuple[
-        str, ...
-    ] = ()  # known values of the models that the plant has others of: "load_mass (0.64 and 1 kg)"
+    differs: tuple[OtherValue, ...] = ()  # known values of the models that the plant has others of
 
 
 def tuned_on_models(
@@ -136,10 +144,10 @@ def _shared(controller: str, system: System) -> dict[str, Mapping[str, Any]]:
     return {"fixed": fixed_parameters(controller, preset.make(plant)), "box": preset.box_on(plant)}
 
 
-def differing(model: ModelRecord, plant: ModelRecord) -> tuple[str, ...]:
+def differing(model: ModelRecord, plant: ModelRecord) -> tuple[OtherValue, ...]:
     """Values that are given in a model, and others in the plant: no fit has found these, and no effect stands for them."""
     return tuple(
-        f"{name} ({one.value:.4g} and {plant.values[name]:.4g} {model.table[name].unit})"
+        OtherValue(name, one.value, plant.values[name], model.table[name].unit)
         for name, one in model.parameters.items()
         if one.origin == "given"
         and name in plant.values

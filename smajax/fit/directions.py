@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from smajax.fit.old_words import worded
+from smajax.core.old_words import worded
 from smajax.fit.sensitivity import Sensitivity
 
 NAMED = 0.3  # a parameter with a smaller share of a direction's largest is not named

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from smajax.core.old_words import worded
 from smajax.data.experiment.record import Prior
 from smajax.data.model_file.actuator_model import ActuatorModel
 from smajax.fit.design import Suggestion
@@ -13,7 +14,6 @@ from smajax.fit.directions import Direction
 from smajax.fit.identifiability import Checks
 from smajax.fit.integration import IntegrationError
 from smajax.fit.levenberg_marquardt import Status
-from smajax.fit.old_words import worded
 from smajax.fit.posterior import Posterior
 from smajax.fit.profile import Profile
 from smajax.fit.uncertainty import Remark

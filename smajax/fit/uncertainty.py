@@ -11,8 +11,8 @@ import numpy as np
 import scipy  # its parts are imported when they are first used
 
 from smajax.core.correlation import correlation_of
+from smajax.core.old_words import worded
 from smajax.core.whiteness import WHITE, bartlett_sum, correlation_time, split_runs, whiteness_p_value
-from smajax.fit.old_words import worded
 from smajax.fit.sensitivity import Sensitivity
 
 # A fitted value nearer to a bound than this share of the range counts as at the bound.

@@ -72,9 +72,10 @@ def conclusions(result: ControlComparison) -> list[str]:
         sentences.append(
             f"{result.controller} tuned on the {one.model} {text}, with an overshoot of at most {overshoot} {result.unit.label}, on the {result.plant}."
         )
-    if result.differs:
+    others = [f"{one.name} ({one.model:.4g} and {one.plant:.4g} {one.unit})" for one in result.differs]
+    if others:
         sentences.append(
-            f"Mind: the {result.plant} differs from the models in what was taken as known: {', '.join(result.differs)}."
+            f"Mind: the {result.plant} differs from the models in what was taken as known: {', '.join(others)}."
         )
     if len(result.tuned) > 1 and result.plant == result.tuned[-1].model:
         sentences.append(

@@ -15,10 +15,7 @@ from smajax.fit.identify_result import Estimate, FitEnd, Identified
 from smajax.fit.levenberg_marquardt import Status
 from smajax.fit.posterior import Posterior
 from smajax.fit.uncertainty import clusters
-from smajax.report.identifiability_words import check_sentences as check_sentences
-from smajax.report.identifiability_words import direction_sentence as direction_sentence
 from smajax.report.identifiability_words import remark_text
-from smajax.report.identifiability_words import weak_combinations as weak_combinations
 from smajax.report.range_words import range_sentences
 
 FAR = 2.0  # standard deviations of what was known before, from which on an estimate contradicts it

@@ -1,10 +1,13 @@
-"""What lies between a plant and its controller, for a page."""
+"""What lies between a plant and its controller, and where it comes from, in words."""
 
 from __future__ import annotations
 
-from smajax.control.loop_settings import LoopSettings
-from smajax.core.display_units import digits
-from smajax.core.wording import counted
+from collections.abc import Iterable
+
+from smajax.control.loop_settings import LIMIT_PARAMETER, LoopSettings
+from smajax.control.run_notes import GainsOfFile, LimitOfFitRuns, NoiseOfModelFile, PresetGains, Source
+from smajax.core.display_units import digits, display
+from smajax.core.wording import and_listed, counted
 
 
 def limit_words(loop: LoopSettings, largest: float | None = None) -> str:
@@ -27,5 +30,67 @@ def loop_rows(loop: LoopSettings, largest: float | None = None) -> list[list[str
             "what the controller reads",
             f"the state from the filter {loop.estimator}" if loop.estimator else "the true state",
         ],
-        ["sensor of the position", loop.noise_words()],
+        ["sensor of the position", noise_words(loop)],
     ]
+
+
+def loop_words(loop: LoopSettings) -> str:
+    """`the command up to 6 V, a control period of 10 ms`; "" of nothing known. The noise is the plant's, and left out."""
+    parts = []
+    if loop.command_limit is not None:
+        parts.append(f"the command up to {digits(loop.command_limit, 4)} {loop.command_unit}")
+    if loop.period is not None:
+        parts.append(f"a control period of {1e3 * loop.period:g} ms")
+    if loop.delay:
+        parts.append(f"a delay of {counted(loop.delay, 'period')}")
+    if loop.estimator:
+        parts.append(f"the filter `{loop.estimator}`")
+    return and_listed(parts) if parts else ""
+
+
+def noise_words(loop: LoopSettings) -> str:
+    """`0.1 mm of noise`, or `no noise`."""
+    if not loop.noise:
+        return "no noise"
+    shown = display(loop.position_unit)
+    return f"{digits(shown.of(loop.noise), 3)} {shown.unit} of noise"
+
+
+def source_sentences(sources: Iterable[Source]) -> tuple[str, ...]:
+    """Where a loop's settings come from; nothing of a file of which the loop takes nothing beside the gains."""
+    return tuple(text for one in sources if (text := source_sentence(one)))
+
+
+def source_sentence(source: Source | None) -> str:
+    """Of one source; "" of none."""
+    match source:
+        case LimitOfFitRuns(command, unit, largest):
+            return (
+                f"The {command} is limited to {digits(largest, 4)} {unit}, the largest of the runs that the model was fitted to; give "
+                f"{LIMIT_PARAMETER} in the model file or with --set for another limit."
+            )
+        case NoiseOfModelFile(noise, reading, unit):
+            shown = display(unit, reading)
+            said = f"{digits(shown.of(noise), 3)} {shown.unit}"
+            return f"The sensor has the noise of the model file, {said} (1 sigma); --noise gives another one, --noise 0 none."
+        case PresetGains(controller, scaled):
+            how = ", scaled from the arm to this load's stroke, force and time" if scaled else ""
+            return (
+                f"No gains file: the gains are those of the preset of {controller}{how}, and not tuned on this plant; `smajax tune {controller}` "
+                "tunes them, and --gains takes its gains.json."
+            )
+        case GainsOfFile():
+            return _gains_sentence(source)
+    return ""
+
+
+def _gains_sentence(source: GainsOfFile) -> str:
+    """What the loop takes from a file of gains, and what it means where the file is older and says nothing."""
+    if source.older:
+        return (
+            f"The gains of {source.controller} are from a file that says neither limit, filter nor control period (an older version, or written "
+            f"by hand): those of this plant and of the options hold, {loop_words(source.own)}."
+        )
+    others = [f"{name} {digits(value, 4)}" for name, value in source.fixed.items()]
+    words = [one for one in (loop_words(source.taken), *others) if one]
+    return f"As in the file of the gains of {source.controller}: {', '.join(words)}." if words else ""

@@ -26,9 +26,10 @@ from smajax.report import animation
 from smajax.report.drawing import BLUE, GREEN, GREY, RED, UPRIGHT, keyed, named, panels, styled
 from smajax.report.embedded import picture
 from smajax.report.integration_words import integration_sentence
-from smajax.report.loop_words import loop_rows
+from smajax.report.loop_words import loop_rows, source_sentences
 from smajax.report.measured_log import draw_measured, measured_of
 from smajax.report.next_steps import Step, section
+from smajax.report.note_words import note_sentences
 from smajax.report.pictures import NARROW, as_png
 from smajax.report.plain_page import bullets, headline, table, whole
 from smajax.report.series_plot import Band, Line, Panel, SeriesPlot, moving, set_point_line
@@ -79,10 +80,10 @@ def record(result: RunResult, command: str, series: bool = True) -> dict[str, An
             }
             for one in result.mismatches
         },
-        "notes": list(result.notes),
+        "notes": note_sentences(result.notes),
         "headline": answer(result),
         "conclusions": conclusions(result),
-        "settings": list(result.settings),
+        "settings": list(source_sentences(result.settings)),
         "loop": None if result.loop is None else result.loop.record(),
         "merit": _merit(result.merit, units),
         "merit_by_set_point": [
@@ -243,7 +244,7 @@ def page(
     parts = [
         f"<h1>{html.escape(title)}</h1>",
         headline(answer(result)),
-        bullets(result.notes),
+        bullets(note_sentences(result.notes)),
         str(moving(series_of(result), picture(image, "the run over time", "panels"))),
         str(picture(hysteresis(result.data), "hysteresis: over the wire's temperature", "narrow")),
         str(picture(film, "the load moving, beside the wire's path through its phase diagram", "panels", upright)),
@@ -292,7 +293,11 @@ def _merit_part(result: RunResult) -> list[str]:
 def _settings_part(result: RunResult) -> list[str]:
     """The loop, where its settings come from, and in what the plant differs from the controller's model."""
     rows = settings_rows(result)
-    parts = ["<h2>Controller and loop</h2>", bullets(result.settings), table(["", ""], rows)] if rows else []
+    parts = (
+        ["<h2>Controller and loop</h2>", bullets(source_sentences(result.settings)), table(["", ""], rows)]
+        if rows
+        else []
+    )
     if result.mismatches:
         parts += ["<h2>In what the plant differs from the controller's model</h2>"]
         parts.append(table(MISMATCH_HEAD, mismatch_rows(result), (1, 2)))

@@ -26,6 +26,7 @@ from smajax.report.plain_page import bullets, headline, table, whole
 from smajax.report.series_picture import series
 from smajax.report.tune_answer import answer, set_point_rows
 from smajax.report.tune_pictures import merits_picture, positions_plot
+from smajax.report.tune_words import goal_sentence, held_out_sentence, plants_sentence
 
 SCALED = "The preset's gains and the box are those of the arm, scaled to this load's stroke, force and time and to the drive's limit."
 EDGE = 0.02  # of the box, by logarithm
@@ -44,7 +45,7 @@ def checked_on(result: TuningResult, name: str) -> str:
     if name == "tuned on":
         return name
     if name == "inside":
-        return f"never seen: {result.settings.held_out_sentence()}"
+        return f"never seen: {held_out_sentence(result.settings)}"
     air = "" if "ambient" in result.settings.variation else f" (the air by {BEYOND * abs(result.air):.3g} K)"
     return f"never seen: another parameter wrong by {100 * BEYOND:g} %{air}, set points tuned"
 
@@ -169,9 +170,9 @@ def conclusions(result: TuningResult) -> list[str]:
         sentences.append(f"Not every limit is met: {'; '.join(missed)}." if missed else met(result, tuned, "tuned on"))
         missed = broken(result, inside)
         sentences.append(
-            f"Of what was never seen ({result.settings.held_out_sentence()}): {'; '.join(missed)}."
+            f"Of what was never seen ({held_out_sentence(result.settings)}): {'; '.join(missed)}."
             if missed
-            else met(result, inside, f"that were never seen ({result.settings.held_out_sentence()})")
+            else met(result, inside, f"that were never seen ({held_out_sentence(result.settings)})")
         )
         if "beyond" in result.checks and (missed := broken(result, result.checks["beyond"])):
             sentences.append(f"With a parameter wrong that was not varied: {'; '.join(missed)}.")
@@ -266,7 +267,7 @@ def page(result: TuningResult, pictures: Mapping[str, bytes], command: str, step
         "seen.</p>",
         table(points, rows, range(len(points))),
         bullets(conclusions(result)),
-        f"<p>Tuned on {say(settings.plants_sentence(result.air))}. {say(settings.goal_sentence())}.</p>",
+        f"<p>Tuned on {say(plants_sentence(settings, result.air))}. {say(goal_sentence(settings))}.</p>",
         section(steps),
         "<h2>Gains</h2>",
         "" if settings.shown.is_angle else f"<p class=quiet>{SCALED}</p>",

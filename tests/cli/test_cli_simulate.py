@@ -19,11 +19,13 @@ from smajax.cli.result_folder import FolderTaken
 from smajax.control.compose import compose
 from smajax.control.mismatch import MISMATCHES
 from smajax.control.perturbed_plant import perturbed_plant
+from smajax.control.run_notes import TooManySetPoints
 from smajax.control.run_request import LoopRequest, RunRequest, run_closed, run_open
 from smajax.core.parameters import parameter_values, set_parameters
 from smajax.core.units import UnitError
 from smajax.data.text_input import clock_of, given, levels
 from smajax.model.presets import build
+from smajax.report.note_words import note_sentences
 from smajax.report.simulate_page import as_csv, write_run
 from smajax.report.simulate_words import conclusions, summary_rows
 from smajax.simulation.compiled import simulate_compiled
@@ -179,7 +181,8 @@ def test_a_set_point_that_moves_all_the_time_has_no_figures_of_merit(tmp_path: P
     (tmp_path / "sine.csv").write_text(f"time (s),angle (rad)\n{rows}\n")
     found = run_closed(RunRequest(dt=0.01), LoopRequest("pid", f"{tmp_path / 'sine.csv'}:angle (rad)"))
     assert (found.merit, found.by_set_point) == ({}, ())
-    assert any("50 at most: this reference has 100." in note for note in found.notes)
+    assert TooManySetPoints(100) in found.notes
+    assert any("50 at most: this reference has 100." in note for note in note_sentences(found.notes))
 
 
 def test_a_written_run_can_be_an_input(folder: Path, tmp_path: Path) -> None:

@@ -18,6 +18,8 @@ from smajax.control.tune.settings import settings_for
 from smajax.data.model_file.actuator_model import ActuatorModel
 from smajax.data.model_file.of_presets import model_of_presets
 from smajax.data.model_file.record import ModelParameter
+from smajax.report.loop_words import source_sentence
+from smajax.report.tune_words import held_out_sentence, plants_sentence
 from tests.fit.test_predict import NOISE, kept_model, log, reading
 from tests.helpers.small_bench import refused, smajax
 
@@ -55,19 +57,22 @@ def test_what_cannot_be_held_against_a_log_is_refused(tmp_path: Path, model: Pat
 
 def test_a_closed_loop_stays_within_the_commands_of_the_fit_runs() -> None:
     kept = kept_model()
-    system, sentence = plant_of(kept)
+    system, limit = plant_of(kept)
     # The drive's amplifier multiplies the command by 1.6.
     assert float(system.drive.largest_command()) == pytest.approx(5.0)
     assert float(sma.get_parameters(system, ["amplifier_limit"])[0]) == pytest.approx(8.0)
-    assert "limited to 5 V, the largest of the runs that the model was fitted to" in sentence
+    assert limit is not None
+    assert (limit.command, limit.unit) == ("voltage", "V")
+    assert limit.largest == pytest.approx(5.0)
+    assert "limited to 5 V, the largest of the runs that the model was fitted to" in source_sentence(limit)
     assert float(plant_of(kept, {"amplifier_gain": 3.2})[0].drive.largest_command()) == pytest.approx(5.0)
     assert float(plant_of(kept, limit=4.0)[0].drive.largest_command()) == pytest.approx(4.0)
-    given_by_set, sentence = plant_of(kept, {"amplifier_limit": "9 V"}, limit=4.0)
+    given_by_set, limit = plant_of(kept, {"amplifier_limit": "9 V"}, limit=4.0)
     assert float(sma.get_parameters(given_by_set, ["amplifier_limit"])[0]) == pytest.approx(9.0)
-    assert sentence == ""
+    assert limit is None
     given = dataclasses.replace(kept.parameters["amplifier_limit"], value=20.0, origin="given")
     own = dataclasses.replace(kept, parameters={**kept.parameters, "amplifier_limit": given})
-    assert plant_of(own)[1] == ""
+    assert plant_of(own)[1] is None
 
 
 @pytest.mark.slow
@@ -163,8 +168,8 @@ def test_gains_are_tuned_on_the_plant_of_another_file_too_and_checked_on_it(tmp_
     plants = options.plants(0, others=False)
     settings = settings_for(options.system(said=False), "pid", plants, set_points=(5.0, 10.0))
     found = settings.check(options.system(said=False), plants)
-    assert settings.plants_sentence() == "the plant as believed and another one; set points 5 mm, 10 mm"
-    assert settings.held_out_sentence() == "set points between those tuned, the other plant"
+    assert plants_sentence(settings) == "the plant as believed and another one; set points 5 mm, 10 mm"
+    assert held_out_sentence(settings) == "set points between those tuned, the other plant"
     seen = tuned_on(settings.set_points, {}, 0, found)
     convection = found.columns.index("convection_coefficient")
     assert sorted(zip(seen.rows[:, convection], seen.targets, strict=True)) == [

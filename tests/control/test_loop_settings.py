@@ -16,7 +16,8 @@ from smajax.control.loop_settings import LoopInUse, LoopSettings, joined
 from smajax.control.run_request import LoopRequest, RunRequest, run_closed
 from smajax.control.run_result import RunResult
 from smajax.data.model_file.of_presets import model_of_presets
-from smajax.report.loop_words import limit_words
+from smajax.report.loop_words import limit_words, source_sentences
+from smajax.report.note_words import note_sentences
 from smajax.report.simulate_page import settings_rows
 from tests.fit.test_predict import NOISE, kept_model
 from tests.helpers.small_bench import refused, smajax
@@ -57,7 +58,7 @@ def test_a_loop_takes_limit_filter_and_period_of_the_gains_file_unless_an_option
     used = json.loads(own.data.attrs["gains"])
     assert (used["largest_voltage"], used["rate_filter"]) == (4.5, 0.05)
     assert float(own.data["voltage"].max()) == pytest.approx(4.5)
-    (said,) = own.settings
+    (said,) = source_sentences(own.settings)
     assert said == (
         "As in the file of the gains of pid: the command up to 4.5 V, a control period of 20 ms and a delay of 1 period, "
         "largest_voltage 4.5, rate_filter 0.05."
@@ -67,7 +68,7 @@ def test_a_loop_takes_limit_filter_and_period_of_the_gains_file_unless_an_option
     assert other.loop.command_limit == pytest.approx(6.0)
     assert (other.loop.period, other.loop.delay) == (0.04, 0)
     assert float(other.data["voltage"].max()) > 4.6
-    assert other.settings == ("As in the file of the gains of pid: rate_filter 0.05.",)
+    assert source_sentences(other.settings) == ("As in the file of the gains of pid: rate_filter 0.05.",)
 
 
 def test_an_older_file_of_gains_is_read_and_what_it_means_is_said(gains: Path) -> None:
@@ -77,8 +78,8 @@ def test_an_older_file_of_gains_is_read_and_what_it_means_is_said(gains: Path) -
     assert result.loop is not None
     assert result.loop.command_limit == pytest.approx(7.0)
     assert result.loop.period == 0.01
-    assert "says neither limit, filter nor control period" in result.settings[1]
-    assert "the command up to 7 V and a control period of 10 ms" in result.settings[1]
+    assert "says neither limit, filter nor control period" in source_sentences(result.settings)[1]
+    assert "the command up to 7 V and a control period of 10 ms" in source_sentences(result.settings)[1]
 
 
 @pytest.mark.parametrize(
@@ -153,7 +154,7 @@ def test_the_noise_is_that_of_the_model_file_unless_an_option_says_otherwise(gai
     own = run_closed(request, LoopRequest("", "5mm:0.4s", gains))
     assert own.loop is not None
     assert own.loop.noise == NOISE
-    assert own.settings[0].startswith("The sensor has the noise of the model file, 0.1 mm (1 sigma)")
+    assert source_sentences(own.settings)[0].startswith("The sensor has the noise of the model file, 0.1 mm (1 sigma)")
     assert "with 0.1 mm of noise" in own.data.attrs["between"]
     assert "without noise" in loop(gains).data.attrs["between"]
     other = run_closed(request, LoopRequest("", "5mm:0.4s", gains, noise="50 um"))
@@ -176,13 +177,13 @@ def test_a_loop_without_a_file_of_gains_says_that_they_are_the_presets(gains: Pa
     request = RunRequest(model=kept_model(), dt=0.01, seconds=0.4)
     own = run_closed(request, LoopRequest("pid", "5mm:0.4s", noise=0.0))
     said = "the gains are those of the preset of pid, scaled from the arm to this load's stroke, force and time"
-    assert [said in one for one in own.settings] == [False, True]
+    assert [said in one for one in source_sentences(own.settings)] == [False, True]
     (limit,) = [row[1] for row in settings_rows(own) if row[0] == "limit of the command"]
     used = json.loads(own.data.attrs["gains"])["largest_voltage"]
     assert limit.startswith(f"up to {min(used, 5.0):.4g} V")
-    assert not any("preset" in one for one in loop(gains).settings)
+    assert not any("preset" in one for one in source_sentences(loop(gains).settings))
     arm = run_closed(RunRequest(dt=0.01, seconds=0.1), LoopRequest("pid", "40deg:0.1s"))
-    assert "those of the preset of pid, and not tuned" in arm.settings[0]
+    assert "those of the preset of pid, and not tuned" in source_sentences(arm.settings)[0]
     assert settings_rows(arm)[0][1].startswith("up to 10 V, the limit of the controller; that of the drive is 5")
 
 
@@ -190,7 +191,7 @@ def test_a_set_point_out_of_reach_is_told_apart_from_a_controller_that_fails(tmp
     """3.5 V hold this wire within its transformation; a weak controller is no matter of reach."""
     kept = kept_model()
     request = RunRequest(model=kept, dt=0.02, values={"amplifier_limit": "5.6 V"})
-    (note,) = run_closed(request, LoopRequest("", "20mm:6s", gains, noise=0.0)).notes
+    (note,) = note_sentences(run_closed(request, LoopRequest("", "20mm:6s", gains, noise=0.0)).notes)
     assert note.startswith(
         "The set point 20 mm is out of reach of every controller: with up to 3.5 V this load comes to rest between 0 and"
     )

@@ -23,6 +23,7 @@ from smajax.control.run_request import LoopRequest, RunRequest, run_closed
 from smajax.model.load.coupon import Coupon
 from smajax.model.system import System
 from smajax.model.wire.heat import mass_per_metre
+from smajax.report.note_words import note_sentences
 from tests.helpers.often import often
 from tests.helpers.own_load import Lever, Scheduled
 
@@ -257,7 +258,7 @@ def test_a_request_by_names_is_in_the_load_s_unit() -> None:
     assert "the position with 0.01 mm of noise" in result.data.attrs["between"]
     assert [one.name for one in result.mismatches] == ["load_mass"]
     beyond = run_closed(request, LoopRequest("pid", "40mm:2s"))
-    assert any("the stroke of the wire under this load" in note for note in beyond.notes)
+    assert any("the stroke of the wire under this load" in note for note in note_sentences(beyond.notes))
 
 
 def test_set_points_by_default_lie_in_the_stroke() -> None:

@@ -18,6 +18,7 @@ from smajax.control.tune.objective import Goal, rank, value_and_gradient
 from smajax.control.tune.scenarios import between, held_out, tuned_on
 from smajax.control.tune.terms import TERMS
 from smajax.model.rigs import arm
+from smajax.report.tune_words import held_out_sentence
 from tests.helpers.tuning_rig import ROWS, SECONDS, SETTINGS
 
 SCENARIOS = tuned_on([0.0, 30.0], {"damping": 0.2}, 0)
@@ -130,7 +131,7 @@ def test_a_tuning_at_one_set_point_is_checked_at_another() -> None:
     for angle, other in ((20.0, 15.0), (-40.0, -35.0), (85.0, 80.0)):
         checks = held_out([angle], {}, 4, 0)
         assert np.degrees(checks["inside"].targets) == pytest.approx([other])
-        told = dataclasses.replace(SETTINGS, set_points=(angle,), variation={}).held_out_sentence()
+        told = held_out_sentence(dataclasses.replace(SETTINGS, set_points=(angle,), variation={}))
         assert told == "a set point 5° beside, the plant as believed"
 
 

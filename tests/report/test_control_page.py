@@ -13,7 +13,7 @@ import pytest
 import smajax as sma
 from smajax.control.gains_file import Gains, read_gains
 from smajax.control.position_unit import PositionUnit
-from smajax.control.tuned_on_models import ControlComparison, EvaluatedLoop, TunedOnModel, differing
+from smajax.control.tuned_on_models import ControlComparison, EvaluatedLoop, OtherValue, TunedOnModel, differing
 from smajax.report.control_page import conclusions, rows, worth, write_comparison
 from tests.fit.test_predict import kept_model
 
@@ -26,7 +26,7 @@ def loop(set_point: float, settling_time: float, overshoot: float = 0.0) -> Eval
     return EvaluatedLoop(set_point, time, set_point * (1.0 - np.exp(-time)), settling_time, overshoot, 1e-14)
 
 
-def compared(*settling: tuple[float, float], differs: tuple[str, ...] = ()) -> ControlComparison:
+def compared(*settling: tuple[float, float], differs: tuple[OtherValue, ...] = ()) -> ControlComparison:
     names = ("base model", "extended model")
     tuned = tuple(
         TunedOnModel(name, Gains("pid", GAINS), UNITS, (loop(0.005, times[0], 1e-4), loop(0.01, times[1])))
@@ -57,7 +57,7 @@ def test_gains_that_are_evaluated_on_the_model_that_they_were_tuned_on_are_said_
 
 
 def test_a_loop_that_never_settles_and_a_rounding_error_are_said_as_such() -> None:
-    result = compared((4.0, math.inf), (3.0, 5.0), differs=("load_mass (0.5 and 1 kg)",))
+    result = compared((4.0, math.inf), (3.0, 5.0), differs=(OtherValue("load_mass", 0.5, 1.0, "kg"),))
     first, second, mind, _ = conclusions(result)
     assert "tuned on the base model settles at 1 of 2 set points, with an overshoot of at most 0.1 mm" in first
     assert "settles after 4 s on average" in second
@@ -84,6 +84,6 @@ def test_known_values_that_the_plant_has_others_of_are_named() -> None:
     known = dataclasses.replace(model, parameters={**model.parameters, "load_mass": mass})
     other = dataclasses.replace(mass, value=1.0)
     plant = dataclasses.replace(model, parameters={**model.parameters, "load_mass": other})
-    assert differing(known, plant) == ("load_mass (0.5 and 1 kg)",)
+    assert differing(known, plant) == (OtherValue("load_mass", 0.5, 1.0, "kg"),)
     assert differing(known, known) == ()
     assert isinstance(known, sma.ActuatorModel)

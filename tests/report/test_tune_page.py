@@ -10,10 +10,11 @@ import numpy as np
 from smajax.control.tune.settings import TuneSettings
 from smajax.control.tune.terms import TERMS
 from smajax.report.tune_page import met, price
+from smajax.report.tune_words import plants_sentence
 
 
 def test_an_error_of_the_ambient_temperature_is_shown_in_kelvin() -> None:
-    told = TuneSettings("vsc3", (0.0,), {"damping": 0.2, "ambient": 0.2}).plants_sentence(20.0)
+    told = plants_sentence(TuneSettings("vsc3", (0.0,), {"damping": 0.2, "ambient": 0.2}), 20.0)
     assert "damping ±20 %, ambient ±4 K at once" in told
 
 

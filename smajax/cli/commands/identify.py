@@ -139,7 +139,8 @@ def identify_command(
 
 def _print(identified: Identified) -> None:
     """The result for a terminal."""
-    from smajax.report.identify_words import answer, conclusions, estimate_rows, posterior_rows, weak_combinations
+    from smajax.report.identifiability_words import weak_combinations
+    from smajax.report.identify_words import answer, conclusions, estimate_rows, posterior_rows
 
     typer.echo(f"\n{identified.title or identified.experiment}")
     for sentence in [answer(identified), *conclusions(identified), *weak_combinations(identified.directions)]:

@@ -134,6 +134,7 @@ def _print(result: RunResult, title: str) -> None:
     """The run for a terminal."""
     from smajax.core.wording import aligned
     from smajax.report.integration_words import integration_sentence
+    from smajax.report.loop_words import source_sentences
     from smajax.report.measured_log import measured_sentences
     from smajax.report.simulate_words import (
         answer,
@@ -146,7 +147,7 @@ def _print(result: RunResult, title: str) -> None:
 
     typer.echo(title)
     typer.echo(f"  {answer(result)}")
-    for sentence in result.settings:
+    for sentence in source_sentences(result.settings):
         typer.echo(f"  {sentence}")
     for row in summary_rows(result.data):
         typer.echo(f"  {row[0]:<28} {row[1]:>11} … {row[2]:<11} last {row[3]:<11} {row[4]}")
@@ -284,6 +285,7 @@ def simulate(
     from smajax.control.run_request import LoopRequest, RunRequest
     from smajax.core.files import json_text
     from smajax.report.next_steps import PlantWords, after_simulate
+    from smajax.report.note_words import note_sentences
     from smajax.report.simulate_page import FILES, record, write_run
 
     check_path(out)
@@ -316,7 +318,7 @@ def simulate(
     }
     with resumable(), claimed(out, "simulate", settings, FILES, overwrite), displayed(console()) as progress:
         page = write_run(result, out, title, command, gif, progress, after_simulate(result, named, str(gains or "")))
-    for note in result.notes:
+    for note in note_sentences(result.notes):
         console().print(note, soft_wrap=True, markup=False, highlight=False)
     if json_out:
         typer.echo(json_text(record(result, command)), nl=False)

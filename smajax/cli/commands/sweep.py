@@ -125,10 +125,12 @@ def loop_of(tuned: Sequence[Gains], given: LoopSettings) -> LoopInUse:
 
 def _sentences(tuned: Sequence[Gains], given: LoopSettings, plant: System, settings: SweepSettings) -> tuple[str, ...]:
     """What the loops take from the files of gains."""
-    from smajax.control.loop_settings import LoopInUse, sentences, settings_of
+    from smajax.control.loop_settings import LoopInUse, settings_of
+    from smajax.control.run_notes import gains_of_files
+    from smajax.report.loop_words import source_sentences
 
     own = settings_of(plant, LoopInUse(None, settings.period, settings.delay, settings.estimator), 0.0)
-    return tuple(sentences({one.controller: (one.loop, one.fixed) for one in tuned}, given, own))
+    return source_sentences(gains_of_files({one.controller: (one.loop, one.fixed) for one in tuned}, given, own))
 
 
 # More than 8 parameters and 80 lines: typer reads the options from them.

@@ -23,9 +23,9 @@ from smajax.control.tune import adam
 from smajax.control.tune.evaluate import STEP
 from smajax.control.tune.multistart import Effort
 from smajax.control.tune.objective import REGULATION, Goal
-from smajax.control.tune.scenarios import HELD_OUT, beside, check_variation
-from smajax.control.tune.terms import terms_in
+from smajax.control.tune.scenarios import check_variation
 from smajax.core.names import close_matches
+from smajax.core.old_words import worded
 from smajax.model.system import System
 from smajax.simulation.integration_error import AUTO, Tolerance
 
@@ -118,41 +118,16 @@ class TuneSettings:
             adam.rule()
 
     def plants_sentence(self, air: float = 20.0) -> str:
-        """On which plants gains are tuned. `air`: degC as believed, of which a share is told in kelvins."""
-        sizes = {name: f"{100 * share:g} %" for name, share in self.variation.items()}
-        if "ambient" in sizes:
-            sizes["ambient"] = f"{self.variation['ambient'] * abs(air):.3g} K"
-        wrong = [f"{name} ±{size}" for name, size in sizes.items()]
-        plants = f"the plant as believed and with {', '.join(wrong)} at once" if wrong else "the plant as believed"
-        if self.batch:
-            several = f"three of every four of a batch of {self.batch}" if self.batch >= HELD_OUT else "the others"
-            plants = f"the plant as believed and {'another one' if self.batch == 1 else several}"
-        return f"{plants}; set points {', '.join(f'{point:g}{self.shown.symbol}' for point in self.set_points)}"
+        """On which plants gains are tuned, in words; DeprecationWarning. `air`: degC as believed."""
+        return str(worded("settings.plants_sentence", "tune_words.plants_sentence", "plants_sentence", self, air))
 
     def held_out_sentence(self) -> str:
-        """On what the gains are checked that tuning never saw."""
-        where = "set points between those tuned"
-        if len(self.set_points) == 1:
-            where = f"a set point {beside(self.set_points[0], self.shown):.3g}{self.shown.symbol} beside"
-        if self.batch >= HELD_OUT:
-            return f"every fourth plant of the batch, {where}"
-        if self.batch:
-            return f"{where}, {'the other plant' if self.batch == 1 else 'the other plants'}"
-        return f"plants within the variation, {where}" if self.variation else f"{where}, the plant as believed"
+        """On what the gains are checked that tuning never saw, in words; DeprecationWarning."""
+        return str(worded("settings.held_out_sentence", "tune_words.held_out_sentence", "held_out_sentence", self))
 
     def goal_sentence(self) -> str:
-        """What is made small, and what is kept below a limit."""
-        terms = terms_in(self.shown)
-        parts = [
-            f"{weight:g} x {terms[name].label} ({terms[name].unit})" for name, weight in self.weights.items() if weight
-        ]
-        of = {
-            "nominal": "mean over the set points, plant as believed",
-            "worst": "largest of all loops",
-            "mean-variance": "mean of all loops plus one standard deviation",
-        }[self.objective]
-        limits = [f"{terms[name].label} ≤ {limit:g} {terms[name].unit}" for name, limit in self.limits.items()]
-        return f"Cost: {' + '.join(parts)}, {of}" + (f"; in every loop {', '.join(limits)}" if limits else "")
+        """What is made small, and what is kept below a limit, in words; DeprecationWarning."""
+        return str(worded("settings.goal_sentence", "tune_words.goal_sentence", "goal_sentence", self))
 
     def between_in_words(self) -> str:
         """What lies between plant and controller."""

@@ -1,0 +1,99 @@
+"""What is to be said of a run beside its series: where the settings of a closed loop come from, and what may be wrong; as records."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeAlias
+
+from smajax.control.loop_settings import NOT_KNOWN, OPTIONS, LoopSettings
+
+MOST_SET_POINTS = 50  # with figures of merit; more are a ramp or a sine of a file
+
+
+@dataclass(frozen=True)
+class LimitOfFitRuns:
+    """The command is limited to the largest of the runs that the model was fitted to."""
+
+    command: str  # voltage, current or power
+    unit: str
+    largest: float
+
+
+@dataclass(frozen=True)
+class NoiseOfModelFile:
+    """The sensor has the noise that the model's file has."""
+
+    noise: float  # standard deviation, in `unit`
+    reading: str
+    unit: str  # rad or m
+
+
+@dataclass(frozen=True)
+class PresetGains:
+    """The gains are those of the controller's preset."""
+
+    controller: str
+    scaled: bool  # from the arm to another load
+
+
+@dataclass(frozen=True)
+class GainsOfFile:
+    """The gains are those of a file."""
+
+    controller: str
+    taken: LoopSettings  # what the loop takes from the file
+    fixed: Mapping[str, float]  # parameters of the controller that were not tuned, SI
+    older: bool  # the file says nothing of the loop
+    own: LoopSettings = field(default_factory=LoopSettings)  # of the loop that runs
+
+
+Source: TypeAlias = LimitOfFitRuns | NoiseOfModelFile | PresetGains | GainsOfFile
+
+
+@dataclass(frozen=True)
+class InputLeftOut:
+    """The model was fitted to runs with their own input, which this run leaves to a parameter."""
+
+    channel: str
+    unit: str
+    range: tuple[float, float]  # of the fit runs
+    parameter: str
+    value: float
+
+
+@dataclass(frozen=True)
+class NotFinite:
+    """Variables with values that are not finite."""
+
+    variables: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class AboveMelting:
+    """The wire gets hotter than it can."""
+
+    hottest: float  # degC
+
+
+@dataclass(frozen=True)
+class TooManySetPoints:
+    """The reference has more set points than figures of merit are given of."""
+
+    count: int
+
+
+# A string is the text of an error that did not end the run.
+Note: TypeAlias = InputLeftOut | NotFinite | AboveMelting | TooManySetPoints | str
+
+
+def gains_of_files(
+    files: Mapping[str, tuple[LoopSettings, Mapping[str, float]]], given: LoopSettings, own: LoopSettings
+) -> Iterator[GainsOfFile]:
+    """Of each file of gains what the loop takes from it.
+
+    files: controller -> (its loop, its parameters that were not tuned, SI). given: by options, which go first. own: those of the loop that runs.
+    """
+    over: dict[str, Any] = {name: None for name in OPTIONS if getattr(given, name) is not None}
+    for controller, (loop, fixed) in files.items():
+        yield GainsOfFile(controller, replace(loop, **over), fixed, loop == NOT_KNOWN and not fixed, own)

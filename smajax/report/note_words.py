@@ -1,0 +1,39 @@
+"""What may be wrong with a run, in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from smajax.control.run_notes import (
+    MOST_SET_POINTS,
+    AboveMelting,
+    InputLeftOut,
+    Note,
+    NotFinite,
+    TooManySetPoints,
+)
+from smajax.core.display_units import digits
+from smajax.data.experiment.magnitude import MELTS
+
+
+def note_sentences(notes: Iterable[Note]) -> list[str]:
+    """A sentence a note."""
+    return [_sentence(one) for one in notes]
+
+
+def _sentence(note: Note) -> str:
+    match note:
+        case InputLeftOut(channel, unit, (low, high), parameter, value):
+            return (
+                f"The model was fitted to runs with their own {channel}, {digits(low, 4)} to {digits(high, 4)} {unit}; here it is "
+                f"{parameter}, {digits(value, 4)}. Give --input {channel}=... for another."
+            )
+        case NotFinite(variables):
+            return f"Values that are not finite in {', '.join(variables)}: is the heat or the step too large?"
+        case AboveMelting(hottest):
+            return f"The wire reaches {hottest:.4g} degC, and it melts at {MELTS:g} degC: is the input's unit right?"
+        case TooManySetPoints(count):
+            return (
+                f"Figures of merit are for constant set points, {MOST_SET_POINTS} at most: this reference has {count}."
+            )
+    return note
