@@ -20,6 +20,7 @@ from smajax.attribution.record_error import OutlierRun, RecordError
 from smajax.data.model_file.actuator_model import ActuatorModel
 from smajax.fit.identifiability import Checks
 from smajax.fit.integration import IntegrationError
+from smajax.fit.residual_diagnostics import ResidualDiagnostics as ResidualDiagnostics
 from smajax.fit.uncertainty import Remark
 
 Role = Literal["fit", "held-out"]
@@ -131,22 +132,6 @@ class EffectFinding:
     added: bool
     coefficients: dict[str, CoefficientFinding]
     evidence: dict[str, float]  # posterior_probability, alone_rmse_fit, score_p_value_at_the_end, ...
-
-
-@dataclass(frozen=True)
-class ResidualDiagnostics:
-    """Of the residual (measured minus model) of the fit runs."""
-
-    rmse: float
-    noise_sigma: float
-    ratio: float  # rmse / noise_sigma
-    white: bool
-    whiteness_p_value: float
-    independent: float  # samples over the correlation time
-    by_phase: dict[str, dict[str, float]]  # "heating, transforming" -> {samples, share_of_squared_error, mean, rmse}
-    correlation: dict[str, float]  # with time, input, temperature, martensite_fraction, stress, rate
-    # Of a first-order autoregressive noise, where the residual is taken as one that is larger than estimated; else 0.
-    filter_coefficient: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -1,26 +1,18 @@
-"""Residual diagnostics: its size against the noise, its autocorrelation, and in which phases of a run it is large."""
+"""Whether a residual is noise, by its size and its autocorrelation."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from smajax.attribution.config import AttributionConfig
-from smajax.attribution.findings import ResidualDiagnostics
 from smajax.core.whiteness import WHITE, correlation_time, first_order, whiteness_p_value
+from smajax.fit.residual_diagnostics import ResidualDiagnostics
+from smajax.fit.residual_diagnostics import diagnosed as of_residuals
 
 DEFAULT = AttributionConfig()
-
-
-def phase_of(fraction: np.ndarray, temperature: np.ndarray, ambient: float) -> np.ndarray:
-    """One word per sample for what the wire is doing, from the model's own states; shape (n,)."""
-    rate = np.gradient(fraction)
-    moving = np.abs(rate) > 1e-4
-    warming = np.gradient(temperature) > 0.0
-    hot = temperature - ambient > 0.25 * max(float(np.max(temperature) - ambient), 1e-9)
-    resting = np.where(hot, np.where(warming, "hot, warming", "hot, cooling"), "cold")
-    return np.where(moving, np.where(rate < 0.0, "heating, transforming", "cooling, transforming"), resting)
 
 
 def diagnosed(
@@ -30,46 +22,9 @@ def diagnosed(
     noise_given: bool = True,
     config: AttributionConfig = DEFAULT,
 ) -> ResidualDiagnostics:
-    """Of the fit runs' residuals (SI, one array of shape (n,) a run). `noise_given`: and not estimated.
-
-    `states` gives, run by run, series of the model to hold the residual against; `temperature` and
-    `martensite_fraction` are needed, others (inputs, stress, rates) are correlated as well.
-    """
-    everything = np.concatenate(residuals)
-    rmse = float(np.sqrt(np.mean(everything**2)))
-    p_value = whiteness_p_value(residuals)
-    ambient = min(float(np.min(state["temperature"])) for state in states)
-    phases = np.concatenate([phase_of(state["martensite_fraction"], state["temperature"], ambient) for state in states])
-    total = float(everything @ everything)
-    by_phase = {}
-    for phase in sorted(set(phases.tolist())):
-        here = everything[phases == phase]
-        by_phase[str(phase)] = {
-            "samples": float(len(here)),
-            "share_of_squared_error": float(here @ here) / total if total else 0.0,
-            "mean": float(here.mean()),
-            "rmse": float(np.sqrt(np.mean(here**2))),
-        }
-    correlation = {}
-    for name in states[0]:
-        series = np.concatenate([np.asarray(state[name], float) for state in states])
-        spread = series.std() * everything.std()
-        correlation[name] = (
-            float(np.mean((series - series.mean()) * (everything - everything.mean())) / spread) if spread else 0.0
-        )
-    ratio = rmse / noise_sigma
-    white = p_value > WHITE
-    return ResidualDiagnostics(
-        rmse=rmse,
-        noise_sigma=noise_sigma,
-        ratio=ratio,
-        white=white,
-        whiteness_p_value=p_value,
-        independent=len(everything) / correlation_time(residuals),
-        by_phase=by_phase,
-        correlation=correlation,
-        filter_coefficient=0.0 if noise_given else _filter_coefficient(residuals, noise_sigma, config),
-    )
+    """As `smajax.fit.residual_diagnostics.diagnosed`; `noise_given`: and not estimated, so that no first-order noise is looked for."""
+    coefficient = 0.0 if noise_given else _filter_coefficient(residuals, noise_sigma, config)
+    return replace(of_residuals(residuals, states, noise_sigma), filter_coefficient=coefficient)
 
 
 def noise_like(found: ResidualDiagnostics, config: AttributionConfig = DEFAULT) -> bool:

@@ -9,4 +9,5 @@ Out: results in folders, text on stdout, progress and errors on stderr, exit cod
     renamed, completion                  old names of options; words for the Tab key
     result_folder, progress_display      one result a folder; progress on a terminal
     installation, benchmark              what `doctor` and `bench` compute
+    draft_file                           what `new-experiment` writes
 """

@@ -4,7 +4,7 @@ In: arrays, pytrees of modules, text. Out: the services below.
 
     parameters, units                    `parameter` (unit, bounds and meaning of a field); conversion of quantities
     runtime, compiling                   `prepare` (float64, compilation cache); notice of a compilation
-    plugins, moved_modules               entry points of other packages; old module paths
+    plugins, moved_modules, old_words    entry points of other packages; old module paths; sentences that are the report's now
     progress, result_cache, files        typed events; cached results; files written in one step
     provenance, machine                  versions, code and parameters of a result; the machine
     operating_system                     what differs between Linux, macOS and Windows

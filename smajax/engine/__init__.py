@@ -9,14 +9,23 @@ goes through the cache: a step of a wire is some hundred such loops. Here the sa
 becomes one loop over groups of runs, few enough that all they need stays in the nearest cache from the first step to the
 last, in phases (`phases`) that keep their results in registers.
 
+Also public, for who divides runs into chunks: the sizes of blocks that XLA runs (`block_size`, `rounded`, `ON_CARD`, `on_card`), and what keys
+and bounds a cache of traced functions (`key_of`, `cached`).
+
 jaxpr (`translate`, `array_operations`, `jax_versions`) -> LLVM's language (`text`, `arithmetic`, `phases`) -> machine code, and threads that run it
 (`kernel`), cached on disk (`cache`); or `xla`.
 """
 
+from smajax.engine.arguments import key_of as key_of
 from smajax.engine.facade import Engine as Engine
 from smajax.engine.facade import EngineError as EngineError
 from smajax.engine.facade import EngineWarning as EngineWarning
 from smajax.engine.facade import Program as Program
+from smajax.engine.facade import cached as cached
 from smajax.engine.facade import engine_of as engine_of
 from smajax.engine.facade import program as program
 from smajax.engine.text import Unsupported as Unsupported
+from smajax.engine.xla import ON_CARD as ON_CARD
+from smajax.engine.xla import block_size as block_size
+from smajax.engine.xla import on_card as on_card
+from smajax.engine.xla import rounded as rounded

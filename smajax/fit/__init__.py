@@ -3,7 +3,7 @@
 In: `Experiment` and `Run` (data), a `System` (model), sensor outputs of simulated runs (simulation).
 `experiment_problem` packs them into a `Problem`; `starts.multistart` and `levenberg_marquardt` fit many tasks of it at
 once, `noise` and `robust` weight its samples; `sensitivity` is the Jacobian at a fit, from which `uncertainty`,
-`directions`, `profile`, `posterior` and `design` follow.
+`identifiability`, `directions`, `profile`, `posterior` and `design` follow.
 Out: `Fit` (levenberg_marquardt), `Sensitivity`, `Uncertainty`, and, of a whole identification, `Identified`
 (identify_result), which attribution and report read.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import jax.numpy as jnp
@@ -20,13 +20,16 @@ from smajax.data.model_file.record import LikelyModel, ModelOutput, range_unit
 from smajax.data.model_file.runs_of_model import runs_of_model
 from smajax.data.open_experiment import open_experiment
 from smajax.fit.integration import (
-    IntegrationError,
     choose_integration,
     integration_error,
     unlimited,
     with_integration,
 )
 from smajax.fit.packed_runs import pack, simulate_batch, states_by_run
+from smajax.fit.prediction import Extrapolation as Extrapolation
+from smajax.fit.prediction import PredictedRun as PredictedRun
+from smajax.fit.prediction import PredictedSeries as PredictedSeries
+from smajax.fit.prediction import Prediction as Prediction
 from smajax.fit.prediction_band import BAND as BAND
 from smajax.fit.prediction_band import NORMAL, averaged_band, reading_of
 from smajax.fit.problem import Problem
@@ -34,58 +37,6 @@ from smajax.model.channels import SHOWN
 
 BEYOND = 0.02  # of a fitted range: by less a run does not leave it
 FEW = 0.005  # of the samples: a single one of a rate is a jump of an input
-
-
-@dataclass(frozen=True)
-class PredictedSeries:
-    """One sensor in one run, arrays of shape (n,), SI; nan in `measured` where a sample is missing."""
-
-    output: str
-    unit: str
-    measured: np.ndarray
-    reading: np.ndarray  # of the average of the likely models, with the run's offset
-    half_width: np.ndarray  # of the band
-    noise: float  # sigma of a sample
-    offset: float  # of the run, that was added to the reading: the average of the likely models'
-    rmse: float
-    coverage: float  # share of the measured samples inside the band
-
-
-@dataclass(frozen=True)
-class Extrapolation:
-    """A quantity that leaves the range of the runs that the model was fitted to, SI."""
-
-    quantity: str
-    unit: str
-    fitted: tuple[float, float]  # lowest and highest
-    reached: tuple[float, float]
-    share: float  # of the samples
-    spans: tuple[tuple[float, float], ...]  # s, of the run's clock: from, to
-
-
-@dataclass(frozen=True)
-class PredictedRun:
-    """One run as the model predicts it."""
-
-    name: str
-    time: np.ndarray  # (n,), s
-    inputs: dict[str, np.ndarray]
-    series: tuple[PredictedSeries, ...]
-    states: dict[str, np.ndarray]  # of the likeliest model: temperature (degC), martensite_fraction (-), stress (Pa)
-    extrapolation: tuple[Extrapolation, ...]
-    sha256: str
-    fitted: bool  # whether the model was fitted to this run
-
-
-@dataclass(frozen=True)
-class Prediction:
-    """A model's prediction of some runs. step: s, from sample to sample."""
-
-    model: ActuatorModel
-    runs: tuple[PredictedRun, ...]
-    step: float
-    integration: IntegrationError
-    warnings: tuple[str, ...] = ()
 
 
 def predict(  # keywords, which a caller names one by one

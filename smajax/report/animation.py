@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,6 @@ from smajax.model.system import System
 from smajax.model.types import Series, Trajectory
 from smajax.model.wire.wire import Kinetics
 from smajax.report.pictures import MEASURED, QUIET, tidy
-from smajax.simulation.compiled import simulate_compiled
 from smajax.simulation.simulate import DEFAULT_STEP
 
 HOT, COLD = "#c8553d", "#1f6fb2"
@@ -47,7 +47,14 @@ def animate_run(
     seconds: float = 6.0,
     frames: int = 90,
 ) -> Path:
-    """Simulate `system` over `inputs`, each of shape (n,), SI, `dt` s apart, and draw it as `animate` does."""
+    """Simulate `system` over `inputs`, each of shape (n,), SI, `dt` s apart, and draw it as `animate` does; DeprecationWarning."""
+    warnings.warn(
+        "animate_run(system, inputs, path, dt) is animate(system, simulate_compiled(system, inputs, dt), path) now; it goes in version 0.3",
+        DeprecationWarning,
+        stacklevel=2,
+    )
+    from smajax.simulation.compiled import simulate_compiled  # here, so that nothing else of this file simulates
+
     return animate(system, simulate_compiled(system, inputs, dt), path, seconds=seconds, frames=frames)
 
 

@@ -14,7 +14,7 @@ from smajax.report.identifiability_words import remark_text
 
 if TYPE_CHECKING:
     from smajax.fit.identify_result import Identified  # which is made with words of this package
-    from smajax.fit.predict import Prediction
+    from smajax.fit.prediction import Prediction
 
 RUNS, PARAMETERS = "runs.csv", "parameters.csv"
 

@@ -9,16 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from smajax.attribution.findings import ResidualDiagnostics
 from smajax.core.display_units import digits, display, label
 from smajax.core.files import json_text, replace
 from smajax.core.provenance import made_with
-from smajax.fit.predict import BAND, PredictedRun, Prediction
+from smajax.fit.prediction import PredictedRun, Prediction
+from smajax.fit.prediction_band import BAND
+from smajax.fit.residual_diagnostics import ResidualDiagnostics
 from smajax.report.csv_files import RUNS, predicted_runs
 from smajax.report.integration_words import integration_sentence
 from smajax.report.next_steps import Step, section
 from smajax.report.plain_page import bullets, folded, headline, table, whole
-from smajax.report.predict_words import HEAD, band_sentence, conclusions, diagnostics, pooled, run_rows
+from smajax.report.predict_words import HEAD, band_sentence, conclusions, run_rows
 from smajax.report.run_plots import measured_line, output_alone, output_panel, residual_panel, run_plot
 from smajax.report.series_picture import COARSE, series, series_of_runs
 from smajax.report.series_plot import Band, Line, SeriesPlot, samples_of
@@ -63,14 +64,13 @@ def record(result: Prediction, command: str = "") -> dict[str, Any]:
     """The numbers, SI, temperatures in degrees Celsius, for a program; the series are in runs.csv."""
     model = result.model
     outputs = {}
-    for k, one in enumerate(result.runs[0].series):
-        error, share = pooled(result, k)
+    for one, errors in zip(result.runs[0].series, result.errors, strict=True):
         outputs[one.output] = {
             "unit": one.unit,
-            "rmse": error,
+            "rmse": errors.rmse,
             "noise_sigma": one.noise,
-            "band_coverage": share,
-            "residual": _diagnostics(diagnostics(result, k)),
+            "band_coverage": errors.coverage,
+            "residual": _diagnostics(errors.residual),
         }
     return {
         "command": command,

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from smajax.attribution.findings import ResidualDiagnostics
-from smajax.attribution.residual_diagnostics import diagnosed
 from smajax.core.display_units import digits, display, label
 from smajax.core.wording import and_listed, per_cent, times_noise
-from smajax.fit.predict import Extrapolation, PredictedRun, Prediction
+from smajax.fit.prediction import Extrapolation, PredictedRun, Prediction
 from smajax.report.narrative.residual import residual_sentences
 
 LISTED = 3  # spans of time in a sentence
@@ -26,55 +24,21 @@ HEAD = (
 )
 
 
-def measured_runs(result: Prediction, output: int = 0) -> list[PredictedRun]:
-    """Those with a sample of that output."""
-    return [run for run in result.runs if np.isfinite(run.series[output].rmse)]
-
-
-def pooled(result: Prediction, output: int) -> tuple[float, float]:
-    """(rms error, share of the samples in the band) of one output over all samples of all runs, SI."""
-    errors = [run.series[output].measured - run.series[output].reading for run in result.runs]
-    widths = [run.series[output].half_width for run in result.runs]
-    error, width = np.concatenate(errors), np.concatenate(widths)
-    present = np.isfinite(error)
-    if not present.any():
-        return float("nan"), float("nan")
-    return float(np.sqrt(np.mean(error[present] ** 2))), float(np.mean(np.abs(error) <= width, where=present))
-
-
-def diagnostics(result: Prediction, output: int = 0) -> ResidualDiagnostics | None:
-    """Of the residual of one output over all runs; None where nothing was measured."""
-    runs = measured_runs(result, output)
-    if not runs:
-        return None
-    residuals, states = [], []
-    for run in runs:
-        one = run.series[output]
-        present = np.isfinite(one.measured)
-        held = {"time": run.time - run.time[0], **run.states}
-        held["temperature_rate"] = np.gradient(run.states["temperature"])
-        held |= {name: values for name, values in run.inputs.items() if name not in held}
-        residuals.append((one.measured - one.reading)[present])
-        states.append({name: np.asarray(values)[present] for name, values in held.items()})
-    return diagnosed(residuals, states, runs[0].series[output].noise)
-
-
 def conclusions(result: Prediction) -> list[str]:
     """The answer first, then what is left, then where the model extrapolates."""
     sentences = []
-    for k, one in enumerate(result.runs[0].series):
+    for k, (one, errors) in enumerate(zip(result.runs[0].series, result.errors, strict=True)):
         unit = display(one.unit, one.output)
-        error, share = pooled(result, k)
-        if not np.isfinite(error):
+        if not np.isfinite(errors.rmse):
             continue
-        size = f"{digits(unit.of(error), 3)} {unit.unit}".strip()
+        size = f"{digits(unit.of(errors.rmse), 3)} {unit.unit}".strip()
         noise = f"{digits(unit.of(one.noise), 3)} {unit.unit}".strip()
-        count = len(measured_runs(result, k))
+        count = len(result.measured_runs(k))
         sentences.append(
             f"The {label(one.output)} of {count} run{'s' if count > 1 else ''} is predicted with an error (rms) of {size}, "
-            f"{times_noise(error / one.noise, f'the noise of {noise}')}; {per_cent(share)} of the samples lie in the 90 % band."
+            f"{times_noise(errors.rmse / one.noise, f'the noise of {noise}')}; {per_cent(errors.coverage)} of the samples lie in the 90 % band."
         )
-        found = diagnostics(result, k)
+        found = errors.residual
         if found is not None:
             # The first of its sentences, the size, has been said.
             sentences += ["The residual is white."] if found.white else residual_sentences(found)[1:]
@@ -87,7 +51,7 @@ def conclusions(result: Prediction) -> list[str]:
 
 def zero_sentences(result: Prediction, output: int) -> list[str]:
     """That a run's own zero, which is fitted to the run, is many noises, with the largest; nothing of smaller ones."""
-    large = [run for run in measured_runs(result, output) if _zero_ratio(run, output) >= LARGE_ZERO]
+    large = [run for run in result.measured_runs(output) if _zero_ratio(run, output) >= LARGE_ZERO]
     if not large:
         return []
     worst = max(large, key=lambda run: _zero_ratio(run, output))

@@ -2,29 +2,19 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from matplotlib.figure import Figure
 
-from smajax.control.plants import Plants, plant_set
-from smajax.control.reference import clock
-from smajax.control.sweep.run_sweep import (
-    CACHED,
-    ControllerSweep,
-    SweepResults,
-    SweepSettings,
-    assumed_air,
-    line_target,
-)
+from smajax.control.sweep.run_sweep import CACHED, ControllerSweep, SweepResults
 from smajax.core.files import as_netcdf, replace
 from smajax.core.progress import Message, Progress, quiet
 from smajax.core.wording import aligned
-from smajax.model.system import System
 from smajax.report.drawing import UPRIGHT
 from smajax.report.next_steps import after_sweep
 from smajax.report.pictures import as_png
@@ -54,24 +44,20 @@ def files_of(controllers: Sequence[str]) -> list[str]:
 
 
 def write_sweep(
-    system: System,
-    settings: SweepSettings,
+    begun: SweepResults,
     sweeps: Iterable[ControllerSweep],
     out: Path,
     progress: Progress = quiet,
     command: str = "",
-    plants: Plants | None = None,
     remarks: Remarks = NO_REMARKS,
 ) -> SweepResults:
-    """Write the files of each controller as it comes, then those of all; `sweeps` are of `sweep_controllers`, as are the others.
+    """Write the files of each controller as it comes, then those of all; `begun` is of `begun_sweep`, `sweeps` of `sweep_controllers`.
 
     remarks: sentences on set points out of reach, and on where the settings come from, and how commands name the plant.
     """
     out.mkdir(parents=True, exist_ok=True)
-    found = plant_set(system, plants)
-    grid = settings.grid_on(found)
-    time = np.asarray(clock(settings.seconds, settings.dt))
-    target, air = line_target(system, grid), assumed_air(system)
+    settings, grid, unit = begun.settings, begun.grid, begun.unit
+    time, target, air = begun.time, begun.line_target, begun.air
     upright: dict[str, bytes] = {}
     plots: dict[str, SeriesPlot] = {}
     results: list[ControllerSweep] = []
@@ -87,12 +73,12 @@ def write_sweep(
         numbers = digest_of(map_numbers(grid, one))
         write_picture(f"{one.name}_maps.png", size, partial(over_grid, grid=grid, sweep=one, air=air), numbers)
         if one.lines:
-            plots[one.name] = lines_plot(time, settings.line_ratios, one, target, found.unit, air)
+            plots[one.name] = lines_plot(time, settings.line_ratios, one, target, unit, air)
             what: dict[str, Any] = {
                 "ratios": settings.line_ratios,
                 "sweep": one,
                 "target": target,
-                "unit": found.unit,
+                "unit": unit,
                 "air": air,
             }
             height = 3.1 * -(-len(one.lines) // 3)
@@ -105,15 +91,15 @@ def write_sweep(
         for one in results:
             draw = partial(draw_maps, grid=grid, sweep=one, limits=limits, air=air)
             write_picture(f"{one.name}_maps.png", MAPS, draw, digest_of(map_numbers(grid, one)))
-    whole = SweepResults(settings, tuple(results), air, found)
-    comparison = partial(draw_comparison, targets=grid.targets, sweeps=whole.sweeps, position=found.unit)
+    whole = dataclasses.replace(begun, sweeps=tuple(results))
+    comparison = partial(draw_comparison, targets=grid.targets, sweeps=whole.sweeps, position=unit)
     record = as_json(whole, command, remarks)
     write_picture("comparison.png", (10.0, 11.0), comparison, comparison_digest(json.loads(record)))
     replace(out / "sweep.json", record)
     replace(out / "sweep.nc", as_netcdf(as_dataset(whole, command)))
     pictures = {name: ((out / name).read_bytes(), narrow) for name, narrow in upright.items()}
     best = ranked(whole)[0].name
-    steps = after_sweep(out, remarks.plant, best, settings.set_points, found.unit.shown, remarks.gains.get(best, ""))
+    steps = after_sweep(out, remarks.plant, best, settings.set_points, unit.shown, remarks.gains.get(best, ""))
     replace(out / "index.html", page(whole, pictures, command, remarks, plots, steps))
     return whole
 

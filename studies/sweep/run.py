@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from smajax.control.gains_file import read_gains
-from smajax.control.sweep.run_sweep import TRUE_STATE, SweepSettings, sweep_controllers, sweep_settings_for
+from smajax.control.sweep.run_sweep import TRUE_STATE, SweepSettings, begun_sweep, sweep_controllers, sweep_settings_for
 from smajax.core.files import replace
 from smajax.core.progress import Event, Message
 from smajax.core.runtime import prepare
@@ -62,7 +62,7 @@ def _run(changed: dict[str, Any], cache: Path) -> None:
     for folder in SWEEPS:
         settings, work, out = settings_of(folder, **changed), cache / folder, HERE / folder
         sweeps = sweep_controllers(arm(), settings, work, _said)
-        results = write_sweep(arm(), settings, sweeps, work, _said, COMMAND)
+        results = write_sweep(begun_sweep(arm(), settings), sweeps, work, _said, COMMAND)
         print(answer(results), as_text(results), sep="\n", flush=True)
         if changed:
             continue

@@ -11,7 +11,7 @@ import pytest
 from smajax.control.presets import CONTROLLERS
 from smajax.control.sweep.batched_loops import SMALL, LoopSetup, integrated_setup, positions
 from smajax.control.sweep.grid import loop_rows
-from smajax.control.sweep.run_sweep import TRUE_STATE, SweepSettings, sweep_controllers
+from smajax.control.sweep.run_sweep import TRUE_STATE, SweepSettings, begun_sweep, sweep_controllers
 from smajax.core.progress import quiet
 from smajax.model.rigs import arm
 from smajax.report.sweep_folder import write_sweep
@@ -43,7 +43,7 @@ def test_loops_of_a_coarse_clock_take_finer_steps_until_the_error_is_small() -> 
 @pytest.mark.slow
 def test_a_sweep_says_what_its_integration_leaves(tmp_path: Path) -> None:
     settings = SweepSettings(("pid",), "payload", "", 3, (30.0,), (1.0,), seconds=SECONDS, **TRUE_STATE)
-    write_sweep(arm(), settings, sweep_controllers(arm(), settings, tmp_path, quiet), tmp_path)
+    write_sweep(begun_sweep(arm(), settings), sweep_controllers(arm(), settings, tmp_path, quiet), tmp_path)
     error = json.loads((tmp_path / "sweep.json").read_text(encoding="utf-8"))["integration_error"]["pid"]
     assert 0.0 < error["outputs"]["position"]["rms"] < SMALL * whole_transformation(arm())["position"]
     assert "% of a whole transformation" in (tmp_path / "index.html").read_text(encoding="utf-8")

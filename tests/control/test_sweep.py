@@ -27,7 +27,14 @@ from smajax.control.presets import CONTROLLERS
 from smajax.control.reference import clock, constant
 from smajax.control.sweep.batched_loops import LoopSetup, closed_loops
 from smajax.control.sweep.grid import Grid, loop_rows, sweep_ratios
-from smajax.control.sweep.run_sweep import TRUE_STATE, SweepSettings, may_resume, sweep_controllers, sweep_settings_for
+from smajax.control.sweep.run_sweep import (
+    TRUE_STATE,
+    SweepSettings,
+    begun_sweep,
+    may_resume,
+    sweep_controllers,
+    sweep_settings_for,
+)
 from smajax.core.parameters import get_parameters, set_parameters
 from smajax.model.rigs import arm
 from smajax.model.system import System
@@ -46,7 +53,7 @@ SETTINGS = SweepSettings(
 
 
 def run_sweep(system: System, settings: SweepSettings, out: Path, command: str = "") -> None:
-    write_sweep(system, settings, sweep_controllers(system, settings, out), out, command=command)
+    write_sweep(begun_sweep(system, settings), sweep_controllers(system, settings, out), out, command=command)
 
 
 @pytest.fixture(scope="module")

@@ -25,7 +25,7 @@ from smajax.control.plants import plant_set
 from smajax.control.presets import CONTROLLERS
 from smajax.control.reference import clock, constant
 from smajax.control.sweep.grid import loop_rows
-from smajax.control.sweep.run_sweep import TRUE_STATE, SweepSettings, sweep_controllers, sweep_settings_for
+from smajax.control.sweep.run_sweep import TRUE_STATE, SweepSettings, begun_sweep, sweep_controllers, sweep_settings_for
 from smajax.control.tune.evaluate import TuningProblem
 from smajax.control.tune.scenarios import held_out, tuned_on
 from smajax.control.tune.settings import TuneSettings, regulation_weights, settings_for
@@ -265,7 +265,7 @@ SWEEP = SweepSettings(
 @pytest.mark.slow  # that of a batch, below, is in millimetres too
 def test_a_sweep_of_a_bias_spring_is_in_millimetres(tmp_path: Path) -> None:
     """Its loops are single ones; tables, data set and page are in the load's unit."""
-    write_sweep(SPRING, SWEEP, sweep_controllers(SPRING, SWEEP, tmp_path), tmp_path)
+    write_sweep(begun_sweep(SPRING, SWEEP), sweep_controllers(SPRING, SWEEP, tmp_path), tmp_path)
     with (tmp_path / "pid.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     row = rows[-1]
@@ -298,9 +298,8 @@ def test_a_sweep_over_a_batch_has_a_row_a_plant(tmp_path: Path) -> None:
     settings = SweepSettings(
         ("vsc2",), set_points=(5.0, 15.0), gain_ratios=(1.0,), seconds=4.0, tolerance=None, unit="mm", **TRUE_STATE
     )
-    write_sweep(
-        HANGING, settings, sweep_controllers(HANGING, settings, tmp_path, plants=PLANTS), tmp_path, plants=PLANTS
-    )
+    begun = begun_sweep(HANGING, settings, PLANTS)
+    write_sweep(begun, sweep_controllers(HANGING, settings, tmp_path, plants=PLANTS), tmp_path)
     with (tmp_path / "vsc2.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [(row["plant"], row["set_point_mm"]) for row in rows[:3]] == [("1", "5"), ("1", "15"), ("2", "5")]

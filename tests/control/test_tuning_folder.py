@@ -24,7 +24,7 @@ from smajax.control.presets import CONTROLLERS
 from smajax.control.reference import resting
 from smajax.control.sweep.batched_loops import LoopSetup, closed_loops
 from smajax.control.sweep.grid import loop_rows
-from smajax.control.sweep.run_sweep import TRUE_STATE, SweepSettings, sweep_controllers
+from smajax.control.sweep.run_sweep import TRUE_STATE, SweepSettings, begun_sweep, sweep_controllers
 from smajax.control.tune.cma_es import CmaEsState
 from smajax.control.tune.evaluate import TuningProblem
 from smajax.control.tune.folder_names import FILES
@@ -170,7 +170,7 @@ def test_a_sweep_uses_the_tuned_gains(folder: Path, tmp_path: Path) -> None:
     assert {name: written[name]["unit"] for name in names} == {name: parameters(tuned)[name].unit for name in names}
     one_step = {"seconds": SECONDS, "tuned": (gains,), "tolerance": None, **TRUE_STATE}
     settings = SweepSettings(("vsc3",), "payload", "supply", 2, (0.0, 30.0), (1.0,), **one_step)
-    write_sweep(arm(), settings, sweep_controllers(arm(), settings, progress=silent), tmp_path)
+    write_sweep(begun_sweep(arm(), settings), sweep_controllers(arm(), settings, progress=silent), tmp_path)
     record = json.loads((tmp_path / "sweep.json").read_text(encoding="utf-8"))
     assert "gains from a file" in record["between"]
     rows = loop_rows({}, np.radians([0.0, 30.0] * (ROWS // 2)))

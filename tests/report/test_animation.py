@@ -78,7 +78,8 @@ def test_an_upright_animation_is_narrow_and_reports_its_progress(up_and_down: Tr
 
 def test_the_animation_of_a_weight_is_drawn(tmp_path: Path) -> None:
     system = build("flexinol_table_3_2", "dead_weight", "flexinol_voltage")
-    path = animate_run(system, {"voltage": jnp.full(401, 5.5)}, tmp_path / "weight.gif", 0.02, frames=4)
+    with pytest.warns(DeprecationWarning, match="animate_run"):
+        path = animate_run(system, {"voltage": jnp.full(401, 5.5)}, tmp_path / "weight.gif", 0.02, frames=4)
     pictures = frames(path)
     assert len(pictures) == 4
     assert np.abs(pictures[-1] - pictures[0]).max() > 50.0

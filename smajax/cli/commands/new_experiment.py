@@ -14,7 +14,7 @@ from smajax.cli import completion
 from smajax.cli.options import UNMET, Decimal, Json, quantity, texts
 
 if TYPE_CHECKING:
-    from smajax.report.draft_file import DraftFile
+    from smajax.cli.draft_file import DraftFile
 
 KNOWN = "wire_length='0.5 m',wire_diameter='0.31 mm'"
 
@@ -81,10 +81,10 @@ def new_experiment(
     from smajax.core.runtime import prepare
 
     prepare()
+    from smajax.cli.draft_file import write_draft
     from smajax.data.experiment.bench_facts import BenchFacts
     from smajax.data.experiment.draft import draft
     from smajax.data.experiment.draft_model import ModelChoice
-    from smajax.report.draft_file import write_draft
 
     bench = BenchFacts(given, ohms, ohms_per_metre, masses, others)
     result = draft(files, out, title, ModelChoice(load, wire, drive, model), decimal, bench)

@@ -11,7 +11,7 @@ from smajax.cli.options import Decimal, Json, Open, Overwrite, texts
 from smajax.cli.terminal import browse, command_line, console, resumable
 
 if TYPE_CHECKING:
-    from smajax.fit.predict import Prediction
+    from smajax.fit.prediction import Prediction
 
 INPUTS = "mass='0.2 kg',ambient_temperature=25degC"
 VALUES = "damping='20 N s/m',load_mass='0.2 kg'"

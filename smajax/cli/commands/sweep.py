@@ -229,7 +229,7 @@ def sweep(
     from smajax.control.position_unit import unit_of
     from smajax.control.reach import reach_of, reach_sentence
     from smajax.control.scales import is_arm
-    from smajax.control.sweep.run_sweep import may_resume, sweep_controllers
+    from smajax.control.sweep.run_sweep import begun_sweep, may_resume, sweep_controllers
     from smajax.core.provenance import digest
     from smajax.report.sweep_folder import as_text, files_of, write_sweep
     from smajax.report.sweep_page import Remarks, answer
@@ -280,7 +280,9 @@ def sweep(
             displayed(console(), hint=not json_out) as progress,
         ):
             sweeps = sweep_controllers(assumed, settings, out, progress, plants)
-            results = write_sweep(assumed, settings, sweeps, out, progress, command_line(), plants, remarks)
+            results = write_sweep(
+                begun_sweep(assumed, settings, plants), sweeps, out, progress, command_line(), remarks
+            )
     except FolderTaken:
         raise
     except ValueError as error:

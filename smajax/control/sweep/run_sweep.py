@@ -7,6 +7,7 @@ import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -22,6 +23,7 @@ from smajax.control.mismatch import MISMATCHES, default_mismatches
 from smajax.control.plants import Plants, PlantSet, carrying, plant_set
 from smajax.control.position_unit import PositionUnit, check_unit, default_set_points, unit_named, unit_of
 from smajax.control.presets import CONTROLLERS, check_controller, controllers_for
+from smajax.control.reference import clock
 from smajax.control.scales import is_arm, seconds_for
 from smajax.control.sweep.batched_loops import LoopSetup, closed_loops, integrated_setup, least_times, positions
 from smajax.control.sweep.grid import LEAST, MOST, OF_ARM, PLANT, Grid, loop_rows, sweep_ratios
@@ -184,17 +186,23 @@ class ControllerSweep:
 
 @dataclass(frozen=True)
 class SweepResults:
-    """All controllers of a sweep, what they were run with, and the air's temperature (degC) that they assume."""
+    """All controllers of a sweep that are finished, what they were run with, and the air's temperature (degC) that they assume."""
 
     settings: SweepSettings
     sweeps: tuple[ControllerSweep, ...]
     air: float
+    line_target: float  # rad or m, set point of the lines
     plants: PlantSet = OF_ARM
 
-    @property
+    @cached_property
     def grid(self) -> Grid:
         """Of its loops."""
         return self.settings.grid_on(self.plants)
+
+    @property
+    def time(self) -> np.ndarray:
+        """Of the lines, s."""
+        return np.asarray(clock(self.settings.seconds, self.settings.dt))
 
     @property
     def unit(self) -> PositionUnit:
@@ -210,6 +218,13 @@ class SweepResults:
 def assumed_air(system: System) -> float:
     """The air's temperature that controllers assume, degC."""
     return float(get_parameters(system, [MISMATCHES["ambient"]])[0])
+
+
+def begun_sweep(system: System, settings: SweepSettings, plants: Plants | None = None) -> SweepResults:
+    """A sweep of which no controller is finished. Raises ValueError as `SweepSettings.grid_on`."""
+    found = plant_set(system, plants)
+    target = line_target(system, settings.grid_on(found))
+    return SweepResults(settings, (), assumed_air(system), target, found)
 
 
 def line_target(system: System, grid: Grid) -> float:

@@ -3,7 +3,8 @@
 In: `smajax.attribution.findings.Findings`, or what `identify` gives: numbers and enums. Out: a `Narrative`, sentences for the page, the record and the
 terminal; `narrated` does the same for the checks before a fit and the rounds of a search while it runs. Nothing here computes a result: thresholds
 are those of `findings.config`, and each module writes one part. `verdict` has the summary and `caveats` what is to be
-minded; `limits` what the runs do not determine; `priors` those of the experiment file; `residual`, `rounds` and `unknown` the parts of the same name.
+minded; `limits` what the runs do not determine; `priors` those of the experiment file; `residual`, `rounds` and `unknown` the parts of the same name;
+`identification` what `identify` gives.
 """
 
 from __future__ import annotations

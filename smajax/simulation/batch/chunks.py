@@ -14,10 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.core.operating_system import available_cores
-from smajax.engine import Engine, program
-from smajax.engine.arguments import key_of
-from smajax.engine.facade import cached
-from smajax.engine.xla import ON_CARD, block_size, on_card, rounded
+from smajax.engine import ON_CARD, Engine, block_size, cached, key_of, on_card, program, rounded
 from smajax.simulation.batch.axes import Axes
 
 MOST = 1 << 15  # runs a chunk, however little is stored of each: what an interruption loses
