@@ -88,3 +88,13 @@ def test_autocorrelated_noise_may_miss_its_level_by_what_its_correlation_account
     # Of what a slow trace adds to white noise no more than a tenth of the mean square passes.
     white, trace = drawn[0, :, :400], np.sin(np.linspace(0.0, 6.0, 400))
     assert not all_noise(list(white + 0.6 * trace), 1.0)
+
+
+def test_filtered_noise_is_noise_where_the_noise_was_estimated_and_a_trend_is_none() -> None:
+    """The runs of `test_filtered_noise_is_distinguished_from_a_trend`."""
+    random = np.random.default_rng(7)
+    made = [lfilter([0.3], [1.0, -0.8], random.normal(size=1200))[200:] for _ in range(3)]
+    slow = [random.normal(size=1000) + np.sin(np.linspace(0.0, 9.0, 1000)) for _ in range(3)]
+    assert all_noise(made, 0.3, noise_given=False)
+    assert not all_noise(made, 0.3)
+    assert not all_noise(slow, 1.0, noise_given=False)

@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
-from pathlib import Path
 
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from smajax.attribution.close_loop import close_loop
 from smajax.core.parameters import set_parameters
-from smajax.data.experiment.load import load_experiment
-from smajax.data.model_catalogue import CATALOGUE, candidates
+from smajax.data.model_catalogue import candidates
 from smajax.model.extended import extended
 from smajax.model.presets import build
 from smajax.model.system import System
 from smajax.model.wire.form import IntegratedForm, RateForm
 from smajax.simulation.compiled import simulate_compiled
-from studies.attribution_benchmark.cases import cases
-from studies.attribution_benchmark.write import write
 from tests.helpers.often import often
 
 MARTENSITE, AUSTENITE = 28e9, 75e9
@@ -28,7 +23,6 @@ COUPON = set_parameters(
     build("flexinol_isobaric", "coupon", "none"),
     {"young_modulus_austenite": AUSTENITE, "young_modulus_martensite": MARTENSITE},
 )
-TEMPTING = ("elastic_mismatch", "thermal_expansion", "stress_dependent_width", "minor_loops", "two_way_memory")
 
 
 def _formed(form: RateForm | IntegratedForm, system: System = COUPON) -> System:
@@ -84,25 +78,3 @@ def test_models_of_the_rate_form_alone_have_the_candidate() -> None:
         base = build("flexinol_isobaric", load, "voltage")
         assert "elastic_mismatch" in candidates(_formed(RateForm(), base), None, ())
         assert "elastic_mismatch" not in candidates(_formed(IntegratedForm(), base), None, ())
-
-
-@pytest.mark.slow  # a loop
-@pytest.mark.parametrize("hidden", [True, False])
-def test_it_is_found_in_an_independent_coupon_that_has_it_and_in_none_that_has_not(
-    hidden: bool, tmp_path: Path
-) -> None:
-    name = "coupon-elastic_mismatch-10-02" if hidden else "coupon-null-0-01"
-    true = write(next(case for case in cases() if case.name == name), tmp_path)
-    experiment = load_experiment(tmp_path / name / "experiment.toml", CATALOGUE)
-    findings = close_loop(dataclasses.replace(experiment, effects_only=TEMPTING))
-    added = [effect for effect in findings.effects if effect.added]
-    if not hidden:
-        assert (findings.verdict, added) == ("adequate", [])
-        return
-    assert findings.verdict == "explained"
-    assert [effect.name for effect in added] == ["elastic_mismatch"]
-    # The generator has the share `elastic_mismatch` of sigma (1/E_M - 1/E_A), the library a modulus of its own.
-    own = added[0].coefficients["contrast"]
-    share = (1.0 - 1.0 / (1.0 + own.value)) / (1.0 - MARTENSITE / AUSTENITE)
-    assert share == pytest.approx(true.effects["elastic_mismatch"], rel=0.15)
-    assert all(run.rmse_after < 1.2 * experiment.noise_sigma for run in findings.runs if run.role == "held-out")
