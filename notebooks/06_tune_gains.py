@@ -36,8 +36,9 @@ settings = sma.TuneSettings(
     seconds=3.0,
     unseen=2,
 )
-print(settings.plants_sentence())
-print(settings.goal_sentence())
+words = sma.narrate(settings)
+print(words.plants)
+print(words.goal)
 
 # %% [markdown]
 # Every loop also returns the derivatives of every term in every gain. A step minimises the largest of all loops' linear models within a trust region.

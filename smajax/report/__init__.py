@@ -6,7 +6,7 @@ Numbers first, words last: `narrative` turns findings into sentences, `pictures`
 `write` puts the files into their folder, each whole or not at all. The modules `identify_*`, `sweep_*`, `tune_*` and
 `simulate_page` do the same for the other commands.
 
-Public: `Findings`, `IdentificationNarrative`, `Narrative`, `narrate`, `write_report`.
+Public: `Findings`, `IdentificationNarrative`, `Narrative`, `TuningNarrative`, `narrate`, `write_report`.
 """
 
 from importlib import import_module
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from smajax.report.narrative import IdentificationNarrative as IdentificationNarrative
     from smajax.report.narrative import Narrative as Narrative
     from smajax.report.narrative import narrate as narrate
+    from smajax.report.narrative.tuning import TuningNarrative as TuningNarrative
     from smajax.report.write import write_report as write_report
 
 # Imported when they are asked for: a command that writes no report needs no plotting library for a table.
@@ -24,6 +25,7 @@ _WHERE = {
     "Findings": "smajax.attribution.findings",
     "IdentificationNarrative": "smajax.report.narrative",
     "Narrative": "smajax.report.narrative",
+    "TuningNarrative": "smajax.report.narrative.tuning",
     "narrate": "smajax.report.narrative",
     "write_report": "smajax.report.write",
 }

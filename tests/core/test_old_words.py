@@ -29,11 +29,11 @@ def test_a_direction_has_its_sentence_with_a_warning() -> None:
 
 def test_settings_of_a_tuning_have_their_sentences_with_a_warning() -> None:
     settings = TuneSettings("pid", (20.0,), {"damping": 0.2})
-    with pytest.warns(DeprecationWarning, match=r"smajax.report.tune_words.plants_sentence now"):
+    with pytest.warns(DeprecationWarning, match=r"smajax.report.narrate\(settings\).plants now"):
         assert settings.plants_sentence() == plants_sentence(settings)
-    with pytest.warns(DeprecationWarning, match="held_out_sentence"):
+    with pytest.warns(DeprecationWarning, match="held_out_sentence is"):
         assert settings.held_out_sentence() == held_out_sentence(settings)
-    with pytest.warns(DeprecationWarning, match="goal_sentence"):
+    with pytest.warns(DeprecationWarning, match="goal_sentence is"):
         assert settings.goal_sentence() == goal_sentence(settings)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from smajax.control.tune.settings import TuneSettings
 from smajax.control.tune.terms import TERMS
+from smajax.report.narrative import narrate
 from smajax.report.tune_page import met, price
 from smajax.report.tune_words import plants_sentence
 
@@ -16,6 +17,15 @@ from smajax.report.tune_words import plants_sentence
 def test_an_error_of_the_ambient_temperature_is_shown_in_kelvin() -> None:
     told = plants_sentence(TuneSettings("vsc3", (0.0,), {"damping": 0.2, "ambient": 0.2}), 20.0)
     assert "damping ±20 %, ambient ±4 K at once" in told
+
+
+def test_settings_are_narrated_as_findings_are() -> None:
+    settings = TuneSettings("pid", (20.0,))
+    told = narrate(settings)
+    assert told.plants == plants_sentence(settings)
+    assert told.held_out == "a set point 5° beside, the plant as believed"
+    assert told.goal.startswith("Cost: ")
+    assert told.between == settings.between_in_words()
 
 
 def test_a_term_that_the_gains_worsen_is_reported_with_both_numbers() -> None:

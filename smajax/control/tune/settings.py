@@ -119,15 +119,15 @@ class TuneSettings:
 
     def plants_sentence(self, air: float = 20.0) -> str:
         """On which plants gains are tuned, in words; DeprecationWarning. `air`: degC as believed."""
-        return str(worded("settings.plants_sentence", "tune_words.plants_sentence", "plants_sentence", self, air))
+        return str(worded("settings.plants_sentence", "narrate(settings).plants", "plants_sentence", self, air))
 
     def held_out_sentence(self) -> str:
         """On what the gains are checked that tuning never saw, in words; DeprecationWarning."""
-        return str(worded("settings.held_out_sentence", "tune_words.held_out_sentence", "held_out_sentence", self))
+        return str(worded("settings.held_out_sentence", "narrate(settings).held_out", "held_out_sentence", self))
 
     def goal_sentence(self) -> str:
         """What is made small, and what is kept below a limit, in words; DeprecationWarning."""
-        return str(worded("settings.goal_sentence", "tune_words.goal_sentence", "goal_sentence", self))
+        return str(worded("settings.goal_sentence", "narrate(settings).goal", "goal_sentence", self))
 
     def between_in_words(self) -> str:
         """What lies between plant and controller."""

@@ -1,16 +1,16 @@
 """Findings in words: what the numbers allow, and nothing beyond.
 
-In: `smajax.attribution.findings.Findings`, or what `identify` gives: numbers and enums. Out: a `Narrative`, sentences for the page, the record and the
+In: `smajax.attribution.findings.Findings`, or what `identify` gives, or `TuneSettings`: numbers and enums. Out: a `Narrative`, sentences for the page, the record and the
 terminal; `narrated` does the same for the checks before a fit and the rounds of a search while it runs. Nothing here computes a result: thresholds
 are those of `findings.config`, and each module writes one part. `verdict` has the summary and `caveats` what is to be
 minded; `limits` what the runs do not determine; `priors` those of the experiment file; `residual`, `rounds` and `unknown` the parts of the same name;
-`identification` what `identify` gives.
+`identification` what `identify` gives, `tuning` what a tuning was asked for.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import overload
+from typing import TYPE_CHECKING, overload
 
 from smajax.attribution.findings import Findings, Round
 from smajax.core.progress import Event, Message, Progress, Result
@@ -26,6 +26,10 @@ from smajax.report.narrative.rounds import chosen_text, reason_text
 from smajax.report.narrative.unknown import comparison_sentence
 from smajax.report.narrative.values import error_text
 from smajax.report.narrative.verdict import summary
+
+if TYPE_CHECKING:
+    from smajax.control.tune.settings import TuneSettings
+    from smajax.report.narrative.tuning import TuningNarrative
 
 LISTED = 3  # sets of effects in the line of a round; the page has all
 
@@ -54,10 +58,18 @@ def narrate(findings: Findings) -> Narrative: ...
 def narrate(findings: Identified) -> IdentificationNarrative: ...
 
 
-def narrate(findings: Findings | Identified) -> Narrative | IdentificationNarrative:
-    """The whole report in sentences: of `close_loop`'s findings, or of what `identify` gives."""
+@overload
+def narrate(findings: TuneSettings) -> TuningNarrative: ...
+
+
+def narrate(findings: Findings | Identified | TuneSettings) -> Narrative | IdentificationNarrative | TuningNarrative:
+    """The whole report in sentences: of `close_loop`'s findings, of what `identify` gives, or of the settings of a tuning."""
     if isinstance(findings, Identified):
         return of_identified(findings)
+    if not isinstance(findings, Findings):
+        from smajax.report.narrative.tuning import of_settings  # here: a search for effects needs no controllers
+
+        return of_settings(findings)
     return Narrative(
         summary=summary(findings),
         unexplained=unexplained(findings),
