@@ -12,18 +12,19 @@ discrepancy, and how well the bench repeats itself.
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from smajax.attribution.findings import AveragedModel, AveragedRun, DroppedModel
+from smajax.attribution.findings import AveragedModel, AveragedRun, DroppedModel, RunFinding
 from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.likely_models_check import checked
 from smajax.attribution.model_fits import Model, Search
 from smajax.fit.packed_runs import RunBatch
 from smajax.fit.prediction_band import BAND, averaged_band, reading_of
-from smajax.fit.problem import Problem
 
 LEAST_PROBABILITY = 0.02
 MOST_MODELS = 6
@@ -34,7 +35,7 @@ class Averaged:
     """The models that were averaged, and every run by their average."""
 
     models: tuple[AveragedModel, ...] = ()
-    runs: tuple[AveragedRun, ...] = ()
+    runs: tuple[AveragedRun, ...] = ()  # of every series: the outputs of the first run, and so on
     dropped: tuple[DroppedModel, ...] = ()
 
 
@@ -52,9 +53,16 @@ def likely_models(search: JointSearch, final: Model) -> list[tuple[FittedModel, 
 
 
 def averaged(
-    setting: Search, search: JointSearch, final: Model, batch: RunBatch, base: Model | None = None
+    setting: Search,
+    search: JointSearch,
+    final: Model,
+    batch: RunBatch,
+    base: Model | None = None,
+    samples: Sequence[int] | None = None,
 ) -> Averaged:
-    """Every run of `batch`, held-out ones included, by the average of the likely models. Of one output, as the search.
+    """Every run of `batch`, held-out ones included, by the average of the likely models.
+
+    `samples` of each run on the clock; None: as many as are measured.
 
     With the `base` model those that carry weight are checked as the final model was (`likely_models_check`).
     """
@@ -63,7 +71,7 @@ def averaged(
     if base is not None:
         models, dropped = checked(setting, search, base, final, models)
     problem, index = setting.restricted([effect for model, _ in models for effect in model.effects])
-    problem = Problem.build(problem.system, batch, problem.noise_sigma, problem.offset)
+    problem = problem.with_system(problem.system, batch)
     own = search.joint.ordered(final.effects)
     readings, variances = [], []
     for model, _ in models:
@@ -73,25 +81,42 @@ def averaged(
         readings.append(found.reading)
         variances.append(found.variance)
     weights = np.asarray([weight for _, weight in models])
-    mean, half = averaged_band(np.stack(readings), np.stack(variances), weights, prediction_error(setting, final))
+    missed = np.tile(prediction_errors(setting, final), batch.runs)[:, None]
+    mean, half = averaged_band(np.stack(readings), np.stack(variances), weights, missed)
+    mask = np.asarray(batch.mask) > 0
+    counts = mask.sum(axis=1) if samples is None else np.asarray(samples)[problem.owner]
     return Averaged(
         tuple(AveragedModel(model.effects, weight) for model, weight in models),
-        tuple(_run(*one) for one in zip(problem.measured, mean, half, np.asarray(batch.mask) > 0, strict=True)),
+        tuple(_run(*one) for one in zip(problem.measured, mean, half, mask, counts.tolist(), strict=True)),
         dropped,
     )
 
 
-def prediction_error(setting: Search, final: Model) -> float:
-    """The absolute error that the share `BAND` of the samples of runs left out stays below, SI."""
-    mask = np.asarray(setting.problem.batch.mask) > 0
-    return float(np.quantile(np.abs(final.left_out[mask]), BAND))
+def with_averages(runs: Sequence[RunFinding], found: Sequence[AveragedRun]) -> tuple[RunFinding, ...]:
+    """`runs` with what the average says of each of their outputs."""
+    each = iter(found)
+    return tuple(
+        dataclasses.replace(
+            run, average=next(each), others=tuple(dataclasses.replace(one, average=next(each)) for one in run.others)
+        )
+        for run in runs
+    )
 
 
-def _run(measured: np.ndarray, reading: np.ndarray, half: np.ndarray, present: np.ndarray) -> AveragedRun:
+def prediction_errors(setting: Search, final: Model) -> list[float]:
+    """The absolute error that the share `BAND` of the samples of runs left out stays below, of each output, SI."""
+    problem = setting.problem
+    mask, outputs = np.asarray(problem.batch.mask) > 0, len(problem.batch.outputs)
+    missed = np.abs(final.left_out) / problem.scale_of_series
+    return [float(np.quantile(missed[k::outputs][mask[k::outputs]], BAND)) for k in range(outputs)]
+
+
+def _run(measured: np.ndarray, reading: np.ndarray, half: np.ndarray, present: np.ndarray, samples: int) -> AveragedRun:
     error = (measured - reading)[present]
     return AveragedRun(
-        reading[present],
-        half[present],
-        float(np.sqrt(np.mean(error**2))),
-        float(np.mean(np.abs(error) <= half[present])),
+        reading[:samples],
+        half[:samples],
+        float(np.sqrt(np.mean(error**2))) if error.size else float("nan"),
+        float(np.mean(np.abs(error) <= half[present])) if error.size else float("nan"),
+        error.size,
     )

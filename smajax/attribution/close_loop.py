@@ -13,9 +13,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.assumed import assumed, expansion_not_given
-from smajax.attribution.averaged_prediction import Averaged, averaged
+from smajax.attribution.averaged_prediction import Averaged, averaged, with_averages
 from smajax.attribution.config import AttributionConfig
 from smajax.attribution.confounders import confounders
+from smajax.attribution.declared_priors import of_unknowns
 from smajax.attribution.findings import (
     Findings,
     NoiseWithoutRun,
@@ -165,10 +166,11 @@ def prepared(  # the stage's inputs, each once
         candidates=job.candidates,
         cache=cache,
         progress=progress,
-        noise_given=experiment.outputs[0].noise_given,
+        noise_given=all(output.noise_given for output in experiment.outputs),
         held_out=job.held_out,
         config=config,
         declared=experiment.priors,
+        of_unknowns=of_unknowns(experiment),
     )
     if integration is None:
         report_warnings(progress, experiment.warnings)
@@ -325,8 +327,9 @@ def findings_of(
     effects = effects_found(job, setting, final, after, scored=not brief)
     average = Averaged()
     if len(job.fit_runs) > 1 and not brief:  # else none can be left out, which the band is made of
-        average = averaged(setting, outcome.search, final, every_run(job), base)
-        runs = tuple(replace(run, average=one) for run, one in zip(runs, average.runs, strict=True))
+        samples = [len(run.time) for run in experiment.runs]
+        average = averaged(setting, outcome.search, final, every_run(job), base, samples)
+        runs = with_averages(runs, average.runs)
     states = {run.name: run.states for run in runs}
     extended_model = base_model = saved_model(job, setting, outcome.search, final, after, average, states)
     if final.effects:

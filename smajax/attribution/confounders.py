@@ -107,7 +107,8 @@ def separating_runs(
     first, *rest = predicted_at(there, [model.values[index] for model in (one, *others)])
     found = []
     for second in rest:
-        apart = np.sqrt(np.mean(there.centred(first - second) ** 2, axis=1)) / float(setting.problem.noise_sigma)
+        difference = there.by_run(there.centred(first - second))
+        apart = np.sqrt(np.mean(difference**2, axis=1)) / float(setting.problem.noise_sigma)
         best = int(np.argmax(np.nan_to_num(apart, nan=-1.0)))
         found.append((list(candidates)[best], float(apart[best])))
     return found

@@ -4,10 +4,19 @@ from __future__ import annotations
 
 import math
 
-from smajax.data.experiment.record import DeclaredPriors, PriorSpread
+from smajax.data.experiment.record import DeclaredPriors, Experiment, PriorSpread
 from smajax.model.effects.prior_width import CoefficientPrior
 
 NONE_DECLARED = DeclaredPriors()
+
+
+def of_unknowns(experiment: Experiment) -> dict[str, CoefficientPrior]:
+    """Of the unknowns that have a prior."""
+    return {
+        one.name: CoefficientPrior(one.prior.mean, one.prior.sigma, one.prior.logarithmic)
+        for one in experiment.unknowns
+        if one.prior is not None
+    }
 
 
 def overridden(own: CoefficientPrior, declared: PriorSpread | None, bounds: tuple[float, float]) -> CoefficientPrior:

@@ -17,13 +17,16 @@ import numpy as np
 from smajax.attribution.config import AttributionConfig
 from smajax.attribution.prior_finding import PriorFinding
 from smajax.attribution.record_error import OutlierRun, RecordError
+from smajax.attribution.run_finding import AveragedRun as AveragedRun
+from smajax.attribution.run_finding import OutputFinding as OutputFinding
+from smajax.attribution.run_finding import Role as Role
+from smajax.attribution.run_finding import RunFinding as RunFinding
+from smajax.attribution.run_finding import pooled as pooled
 from smajax.data.model_file.actuator_model import ActuatorModel
 from smajax.fit.identifiability import Checks
 from smajax.fit.integration import IntegrationError
 from smajax.fit.residual_diagnostics import ResidualDiagnostics as ResidualDiagnostics
 from smajax.fit.uncertainty import Remark
-
-Role = Literal["fit", "held-out"]
 
 
 class Verdict(StrEnum):
@@ -54,35 +57,6 @@ class AveragedModel:
 
 
 @dataclass(frozen=True)
-class AveragedRun:
-    """One run by the average of the likely models, arrays of shape (n,), SI."""
-
-    reading: np.ndarray
-    half_width: np.ndarray  # of the band about it in which nine of ten measured samples are expected
-    rmse: float
-    coverage: float  # share of the measured samples inside the band
-
-
-@dataclass(frozen=True)
-class RunFinding:
-    """One measured run beside the two models; every array has shape (n,) on the same clock."""
-
-    name: str
-    role: Role
-    time: np.ndarray  # s
-    inputs: dict[str, np.ndarray]  # SI, by channel name
-    measured: np.ndarray  # SI unit of the output
-    before: np.ndarray  # base model, the run's own offset included
-    after: np.ndarray  # extended model; equal to `before` when nothing was added
-    states: dict[str, np.ndarray]  # of the model after: temperature (C), martensite_fraction (-), stress (Pa)
-    offset_before: float
-    offset_after: float
-    rmse_before: float
-    rmse_after: float
-    average: AveragedRun | None = None
-
-
-@dataclass(frozen=True)
 class ParameterFinding:
     """One fitted number. `standard_error` is None when the runs do not determine it (then `remark` says why)."""
 
@@ -94,8 +68,9 @@ class ParameterFinding:
     upper: float
     start: float
     remark: Remark = field(default_factory=Remark)
-    prior_base: float | None = None  # middle of the prior of a preset's value; None of what has none
+    prior_base: float | None = None  # middle of its prior; None of what has none
     prior_deviation: float | None = None  # widths of that prior from its middle, with a sign
+    prior_of_unknown: bool = False  # given with the unknown in the file; else of a preset's value
 
     @property
     def limited(self) -> bool:
@@ -342,8 +317,9 @@ class Findings:
 
     @property
     def integration_error(self) -> float:
-        """What the integration leaves in the output of the final model, SI: root mean square of the worst fit run."""
-        return max(self.integration.rms.values())
+        """What the integration leaves in the first output of the final model, SI: root mean square of the worst fit run."""
+        rms = self.integration.rms
+        return rms.get(self.output_name, next(iter(rms.values())))
 
     @property
     def added(self) -> tuple[EffectFinding, ...]:
@@ -372,13 +348,23 @@ def _warned(old: str, now: str, value: Any) -> Any:
 
 def pooled_rmse(runs: Sequence[RunFinding], role: Role, which: Literal["before", "after"]) -> float:
     """Root mean square error over all samples of the runs with `role`, SI; NaN when there are none."""
-    squares = [getattr(run, f"rmse_{which}") ** 2 * len(run.time) for run in runs if run.role == role]
-    samples = [len(run.time) for run in runs if run.role == role]
-    return float(np.sqrt(sum(squares) / sum(samples))) if samples else float("nan")
+    return pooled((getattr(run, f"rmse_{which}"), run.samples) for run in runs if run.role == role)
+
+
+def other_outputs(findings: Findings) -> list[OutputFinding]:
+    """The outputs beside the first, as any run has them."""
+    return list(findings.runs[0].others) if findings.runs else []
+
+
+def pooled_rmse_of(runs: Sequence[RunFinding], output: str, role: Role, which: Literal["before", "after"]) -> float:
+    """`pooled_rmse` of an output beside the first."""
+    found = [one for run in runs if run.role == role for one in run.others if one.name == output]
+    return pooled((getattr(one, f"rmse_{which}"), one.samples) for one in found)
 
 
 def coverage(findings: Findings) -> float | None:
     """Share of the held-out samples inside the band of the averaged prediction; None without any."""
     averages = [run.average for run in findings.runs if run.role == "held-out" and run.average is not None]
-    samples = sum(len(one.reading) for one in averages)
-    return sum(one.coverage * len(one.reading) for one in averages) / samples if samples else None
+    averages = [one for one in averages if one.samples]
+    samples = sum(one.samples for one in averages)
+    return sum(one.coverage * one.samples for one in averages) / samples if samples else None

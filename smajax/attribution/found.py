@@ -15,13 +15,13 @@ from smajax.attribution.model_fits import Evidence, Model, Search
 from smajax.attribution.nuisance_grid import scores_at
 from smajax.attribution.prior_finding import PriorFinding
 from smajax.core.parameters import parameter_values, parameters
-from smajax.data.experiment.record import DeclaredPriors, Prior
+from smajax.data.experiment.record import DeclaredPriors
 from smajax.fit.base_model import base_model
 from smajax.fit.preset_priors import fitted_priors, preset_priors
-from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.fit.uncertainty import Uncertainty, uncertainty
 from smajax.model.effects.library import LIBRARY
+from smajax.model.effects.prior_width import CoefficientPrior
 
 LEAST_RUNS = 3  # two can be left out in one way only
 NORMAL_95 = 1.96
@@ -39,11 +39,11 @@ def parameters_found(job: Job, setting: Search, model: Model, start: np.ndarray,
     `error`: what an independent sample may be off by, SI, against which the priors of the presets count.
     """
     presets = setting.presets
+    known_before = {**setting.of_unknowns, **presets}
     names = [*setting.free(model.effects), *presets]
     index = job.problem.names.index
     own, slots = setting.restricted(model.effects)
-    priors = {name: Prior(one.base, one.sigma, one.logarithmic) for name, one in presets.items()}
-    problem = Problem.build(own.system, own.batch, error, own.offset, priors=priors)
+    problem = own.with_system(own.system, priors=setting.prior_records(presets=True)).with_noise(error)
     at: Sensitivity = sensitivity(problem, model.values[slots], names)
     values = {name: float(model.values[index(name)]) for name in names}
     known = uncertainty(at, names, values, job.bounds)
@@ -58,12 +58,17 @@ def parameters_found(job: Job, setting: Search, model: Model, start: np.ndarray,
                 *job.bounds[name],
                 float(start[index(name)]),
                 known.remarks[name],
-                *((presets[name].base, presets[name].deviation(values[name])) if name in presets else ()),
+                *_beside_prior(known_before.get(name), values[name]),
+                prior_of_unknown=name in setting.of_unknowns,
             )
             for name in names
         ),
         known,
     )
+
+
+def _beside_prior(prior: CoefficientPrior | None, value: float) -> tuple[float | None, float | None]:
+    return (None, None) if prior is None else (prior.base, prior.deviation(value))
 
 
 def effects_found(

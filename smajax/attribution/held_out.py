@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Literal
 
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.attribution.findings import HeldOutWorse, Rejected, ResidualDiagnostics, RunFinding, pooled_rmse
+from smajax.attribution.findings import (
+    HeldOutWorse,
+    OutputFinding,
+    Rejected,
+    ResidualDiagnostics,
+    RunFinding,
+    pooled_rmse,
+)
 from smajax.attribution.job import Job
 from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.joint_stage import final_model, without
@@ -17,9 +25,9 @@ from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.paired_errors import Comparison, runs_compared
 from smajax.attribution.residual_diagnostics import diagnosed
 from smajax.core.parameters import parameter_values
-from smajax.data.experiment.record import Run
+from smajax.data.experiment.record import Experiment, Output, Run
 from smajax.fit.integration import unlimited
-from smajax.fit.packed_runs import RunBatch, pack, simulate_batch, states_by_run
+from smajax.fit.packed_runs import RunBatch, pack, simulate_with_outputs, states_by_run
 from smajax.model.channels import SHOWN
 from smajax.model.types import Trajectory
 
@@ -74,9 +82,9 @@ def _beside(new: Compared, old: Compared, setting: Search, which: Literal["befor
     return runs_compared(mine, theirs, which, setting.config)
 
 
-def _simulated(setting: Search, model: Model | FittedModel, batch: RunBatch) -> Trajectory:
+def _simulated(setting: Search, model: Model | FittedModel, batch: RunBatch) -> tuple[Trajectory, np.ndarray]:
     problem, index = setting.restricted(model.effects)
-    return simulate_batch(problem.system_at(jnp.asarray(model.values[index])), batch)
+    return simulate_with_outputs(problem.system_at(jnp.asarray(model.values[index])), batch)
 
 
 def every_run(job: Job) -> RunBatch:
@@ -88,45 +96,85 @@ def every_run(job: Job) -> RunBatch:
 def compare(job: Job, setting: Search, first: Model, final: Model | FittedModel) -> Compared:
     """Every run, held-out ones included, by both models; and the diagnostics of the fit runs' residuals."""
     experiment, batch = job.experiment, every_run(job)
-    before = _simulated(setting, first, batch)
-    after = _simulated(setting, final, batch)
-    shown = {which: states_by_run(one, experiment.runs, SHOWN) for which, one in (("before", before), ("after", after))}
+    simulated = {which: _simulated(setting, model, batch) for which, model in (("before", first), ("after", final))}
+    shown = {which: states_by_run(one, experiment.runs, SHOWN) for which, (one, _) in simulated.items()}
     runs = []
     residuals: dict[str, list[np.ndarray]] = {"before": [], "after": []}
     states: dict[str, list[dict[str, np.ndarray]]] = {"before": [], "after": []}
+    count = len(experiment.outputs)
     for index, run in enumerate(experiment.runs):
-        n = len(run.time)
-        readings, offsets, errors = {}, {}, {}
-        for which, trajectory in (("before", before), ("after", after)):
-            reading = np.asarray(trajectory.reading)[index, :n]
-            offsets[which] = float(np.mean(run.output - reading)) if experiment.offset else 0.0
-            readings[which] = reading + offsets[which]
-            errors[which] = float(np.sqrt(np.mean((run.output - readings[which]) ** 2)))
-            if run.role == "fit":
-                residuals[which].append(run.output - readings[which])
-                states[which].append(_series(run, shown[which][run.name]))
-        runs.append(
-            RunFinding(
-                name=run.name,
-                role="fit" if run.role == "fit" else "held-out",
-                time=run.time,
-                inputs=run.inputs,
-                measured=run.output,
-                before=readings["before"],
-                after=readings["after"],
-                states=shown["after"][run.name],
-                offset_before=offsets["before"],
-                offset_after=offsets["after"],
-                rmse_before=errors["before"],
-                rmse_after=errors["after"],
-            )
-        )
-    noise = experiment.noise_sigma, experiment.outputs[0].noise_given
+        readings = {which: one[index * count : (index + 1) * count] for which, (_, one) in simulated.items()}
+        found = _run_finding(experiment, run, readings, shown["after"][run.name])
+        runs.append(found)
+        if found.role == "fit":
+            for which in states:
+                series = _series(run, shown[which][run.name])
+                residuals[which] += found.residuals("before" if which == "before" else "after")
+                measured = [np.isfinite(one) for one in run.outputs.values()]
+                states[which] += [
+                    {name: values[there] for name, values in series.items()} for there in measured if there.any()
+                ]
+    noise = experiment.noise_sigma, all(output.noise_given for output in experiment.outputs)
     return (
         tuple(runs),
         diagnosed(residuals["before"], states["before"], *noise, setting.config),
         diagnosed(residuals["after"], states["after"], *noise, setting.config),
     )
+
+
+def _run_finding(
+    experiment: Experiment, run: Run, readings: Mapping[str, np.ndarray], states: dict[str, np.ndarray]
+) -> RunFinding:
+    """`readings` of both models, (outputs, N): the first output in the record itself, the others as `others`."""
+    first, *others = (
+        _beside_models(output, run.outputs[output.name], readings["before"][k], readings["after"][k])
+        for k, output in enumerate(experiment.outputs)
+    )
+    sigma = experiment.noise_sigma
+    return RunFinding(
+        name=run.name,
+        role="fit" if run.role == "fit" else "held-out",
+        time=run.time,
+        inputs=run.inputs,
+        states=states,
+        others=tuple(
+            OutputFinding(
+                name=output.name,
+                unit=output.unit,
+                noise_sigma=output.noise_sigma,
+                noise_how=output.noise_how,
+                scale=sigma / output.noise_sigma,
+                **vars(one),
+            )
+            for output, one in zip(experiment.outputs[1:], others, strict=True)
+        ),
+        **vars(first),
+    )
+
+
+@dataclass(frozen=True)
+class _BesideModels:
+    """One output of one run beside both models; the offsets are in what these say, and all is as in `RunFinding`."""
+
+    measured: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    offset_before: float
+    offset_after: float
+    rmse_before: float
+    rmse_after: float
+
+
+def _beside_models(output: Output, measured: np.ndarray, before: np.ndarray, after: np.ndarray) -> _BesideModels:
+    there, n = np.isfinite(measured), len(measured)
+
+    def beside(reading: np.ndarray) -> tuple[np.ndarray, float, float]:
+        offset = float(np.mean((measured - reading)[there])) if output.offset and there.any() else 0.0
+        left = (measured - (reading + offset))[there]
+        return reading + offset, offset, float(np.sqrt(np.mean(left**2))) if there.any() else float("nan")
+
+    (first, zero, error), (final, zero_after, error_after) = beside(before[:n]), beside(after[:n])
+    return _BesideModels(measured, first, final, zero, zero_after, error, error_after)
 
 
 def _series(run: Run, states: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:

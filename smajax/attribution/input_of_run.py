@@ -78,7 +78,7 @@ class _EventParameters(JointParameters):
     def restricted(self, effects: Sequence[str]) -> tuple[Problem, np.ndarray]:
         own = self.problem
         priors = self.prior_records(effects)
-        same = Problem.build(own.system, own.batch, own.noise_sigma, own.offset, own.per_run, priors)
+        same = own.with_system(own.system, per_run=own.per_run, priors=priors)
         return same, np.arange(len(own.names))
 
 
@@ -134,9 +134,9 @@ def _fits(setting: Search, host: Model, runs: Sequence[str]) -> list[tuple[_Even
     whole = with_effects(system, [kind.coefficient.split(".")[0] for kind in kinds])
     start = jnp.zeros((len(runs), len(kinds)))
     per_run = PerRun(tuple(kind.coefficient for kind in kinds), tuple(runs), start)
-    problem = Problem.build(whole, own.batch, own.noise_sigma, own.offset, per_run)
+    problem = own.with_system(whole, per_run=per_run)
     (left,) = misfits(own, [host.values[slots]])
-    worst = np.argsort(-(left**2).sum(axis=1), kind="stable")[:MOST_RUNS]
+    worst = np.argsort(-(own.by_run(left) ** 2).sum(axis=1), kind="stable")[:MOST_RUNS]
     events = {f"{kind.coefficient}[{runs[run]}]": (kind, runs[run]) for run in worst for kind in kinds}
     joint = _with_events(setting, host, problem, events)
     groups = []

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import jax.numpy as jnp
+
 from smajax.attribution.run_extent import extent_of
 from smajax.core.parameters import parameter_values, parameters
 from smajax.data.experiment.record import Experiment, Run
@@ -49,7 +51,10 @@ def job_of(experiment: Experiment, integration: Integration | None = None) -> Jo
     def problem_with(effects: tuple[str, ...]) -> Problem:
         model = extended(base, effects, {name: value for name, value in known.items() if "." in name})
         batch = pack(runs, experiment.step, parameter_values(model))
-        return Problem.build(model, batch, experiment.noise_sigma, experiment.offset)
+        sigmas = jnp.asarray([output.noise_sigma for output in experiment.outputs])
+        offsets = tuple(output.offset for output in experiment.outputs)
+        whole = Problem.build(model, batch, sigmas if len(sigmas) > 1 else sigmas[0], offsets)
+        return whole.in_first_noises()
 
     declared_problem = problem_with(declared)
     extent = extent_of(declared_problem)

@@ -36,7 +36,9 @@ class JointParameters:
     unknowns: tuple[str, ...]  # those of the experiment, and the values of presets that the runs may correct
     bounds: Mapping[str, tuple[float, float]]
     coefficients: Mapping[str, tuple[str, ...]]  # of each candidate effect, by full name
-    priors: Mapping[str, CoefficientPrior]  # of every coefficient, and of the values of presets
+    priors: Mapping[
+        str, CoefficientPrior
+    ]  # of every coefficient, of the values of presets, and of unknowns that have one
     log_odds: Mapping[str, float]  # of each effect, before the runs were seen
     width_factors: Mapping[str, float] = field(
         default_factory=dict
@@ -52,14 +54,16 @@ class JointParameters:
         extent: Extent,
         presets: Mapping[str, CoefficientPrior] = MappingProxyType({}),
         declared: DeclaredPriors = NONE_DECLARED,
+        of_unknowns: Mapping[str, CoefficientPrior] = MappingProxyType({}),
     ) -> JointParameters:
         """Of a problem whose model carries all `candidates` at their base values.
 
-        `presets`: of `preset_priors`. `declared`: by the experiment file, in the place of what the effects say.
+        `presets`: of `preset_priors`. `declared`: by the experiment file, in the place of what the effects say. `of_unknowns`: by
+        that file as well, of those unknowns that have one.
         """
         at_rest = _load_at_rest(problem)
         coefficients, log_odds = {}, {}
-        priors = dict(presets)
+        priors = {**of_unknowns, **presets}
         for effect in candidates:
             kind = LIBRARY[effect]
             names = tuple(name for name in problem.names if name.startswith(f"{effect}."))
@@ -89,7 +93,7 @@ class JointParameters:
         return prior is not None and not prior.logarithmic and self.bounds[name][0] >= prior.base
 
     def scale(self, name: str, value: float) -> float:
-        """What one width of the prior (one range, of an unknown) is at `value`, in the parameter's unit."""
+        """What one width of the prior (one range, of an unknown without one) is at `value`, in the parameter's unit."""
         prior = self.priors.get(name)
         if prior is None:
             low, high = self.bounds[name]
@@ -97,7 +101,7 @@ class JointParameters:
         return prior.sigma * value if prior.logarithmic else prior.sigma
 
     def deviation(self, name: str, value: float) -> float:
-        """Widths from the base value; 0 of an unknown."""
+        """Widths from the base value; 0 of an unknown without a prior."""
         prior = self.priors.get(name)
         return 0.0 if prior is None else prior.deviation(value)
 
@@ -118,11 +122,8 @@ class JointParameters:
         fitted_ones = tuple(
             one for one in own.effects if one.effect_name in effects or one.effect_name not in self.coefficients
         )
-        batch, sigma = self.problem.batch, self.problem.noise_sigma
-        priors = self.prior_records(effects)
-        problem = Problem.build(
-            dataclasses.replace(own, effects=fitted_ones), batch, sigma, self.problem.offset, priors=priors
-        )
+        system = dataclasses.replace(own, effects=fitted_ones)
+        problem = self.problem.with_system(system, priors=self.prior_records(effects))
         return problem, np.asarray([self.slots[name] for name in problem.names])
 
     def prior_records(self, effects: Sequence[str]) -> dict[str, Prior]:

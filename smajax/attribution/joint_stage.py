@@ -198,8 +198,9 @@ def final_model(search: JointSearch, setting: Search, found: FittedModel, error:
         return as_model(search, best, error)
     start = Start(best.effects, best.values)
     stage = "taking the model to the optimum of the runs"
-    settled = SETTLED_COST * (error / search.noise) ** 2  # the cost counts noises here
-    (fit,), _ = setting.fit([start], stage, enough=setting.config.final_convergence, settled=settled)
+    level = error / search.noise  # the cost counts noises here
+    settled = SETTLED_COST * level**2
+    (fit,), _ = setting.fit([start], stage, enough=setting.config.final_convergence, settled=settled, level=level)
     search.fitted.setdefault(best.effects, best)
     return as_model(search, fitted_model(search.joint, best.effects, fit.values, best.effects), error)
 

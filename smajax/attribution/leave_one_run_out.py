@@ -49,10 +49,11 @@ def left_out(joint: JointParameters, model: FittedModel, error: float, program: 
     if runs < 2 or not model.names:
         return LeftOut(whole, model.values[None])
     parts = np.arange(runs) % min(runs, MOST_PARTS)
-    points = _steps(joint, problem, model, values, parts)
+    owner = parts[problem.owner]
+    points = _steps(joint, problem, model, values, owner)
     found = misfits(problem, points)
-    others = np.asarray([_cost(one, error, parts != part) for part, one in enumerate(found)])
-    before = np.asarray([_cost(whole, error, parts != part) for part in range(len(points))])
+    others = np.asarray([_cost(one, error, owner != part) for part, one in enumerate(found)])
+    before = np.asarray([_cost(whole, error, owner != part) for part in range(len(points))])
     doubtful = np.flatnonzero(~(others < before + BELIEVED))
     if doubtful.size:
         tasks = [problem.task(model.names, joint.bounds, values, (parts != part).astype(float)) for part in doubtful]
@@ -62,7 +63,7 @@ def left_out(joint: JointParameters, model: FittedModel, error: float, program: 
             points[part] = fit.values
     every = np.tile(model.values, (len(points), 1))
     every[:, index] = np.stack(points)
-    return LeftOut(np.stack([found[part, run] for run, part in enumerate(parts)]), every)
+    return LeftOut(np.stack([found[part, series] for series, part in enumerate(owner)]), every)
 
 
 def predicting(
@@ -81,20 +82,18 @@ def jackknife_error(values: np.ndarray) -> np.ndarray:
 
 
 def _steps(
-    joint: JointParameters, problem: Problem, model: FittedModel, values: np.ndarray, parts: np.ndarray
+    joint: JointParameters, problem: Problem, model: FittedModel, values: np.ndarray, owner: np.ndarray
 ) -> list[np.ndarray]:
-    """The parameters (P,) without each part of the runs, within their bounds."""
+    """The parameters (P,) without each part of the runs, within their bounds. `owner`: the part of each series."""
     at = sensitivity(problem, values, model.names)
-    series = len(problem.batch.outputs)
     precision = np.diag(model.precision)
     columns = -at.jacobian * model.scales
     gram = np.einsum("snp,snq->spq", columns, columns)
     gradient = np.einsum("snp,sn->sp", columns, at.misfit)
-    owner = np.repeat(parts, series)
     slots = [problem.names.index(name) for name in model.names]
     low, high = np.asarray([joint.bounds[name] for name in model.names]).T
     points = []
-    for part in range(parts.max() + 1):
+    for part in range(owner.max() + 1):
         others = gram[owner != part].sum(axis=0) + precision
         step = -np.linalg.solve(others, gradient[owner == part].sum(axis=0)) * model.scales
         point = np.array(values)
@@ -103,5 +102,5 @@ def _steps(
     return points
 
 
-def _cost(misfit: np.ndarray, error: float, runs: np.ndarray) -> float:
-    return float(np.nan_to_num((misfit[runs] ** 2).sum() / error**2, nan=np.inf))
+def _cost(misfit: np.ndarray, error: float, series: np.ndarray) -> float:
+    return float(np.nan_to_num((misfit[series] ** 2).sum() / error**2, nan=np.inf))

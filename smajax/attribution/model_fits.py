@@ -84,6 +84,7 @@ class Search:
     rounds: list[Round] = field(default_factory=list)
     presets: Mapping[str, CoefficientPrior] = field(default_factory=dict)  # values that the user did not give
     declared: DeclaredPriors = NONE_DECLARED  # priors by the experiment file
+    of_unknowns: Mapping[str, CoefficientPrior] = field(default_factory=dict)  # the same of unknowns that have one
     # Gets a joint search and its likeliest model (`FittedModel`) after each of its rounds.
     after_round: Callable[[Any, Any], object] | None = None
 
@@ -119,8 +120,16 @@ class Search:
     def joint(self, effects: Sequence[str], presets: Mapping[str, CoefficientPrior] | None = None) -> JointParameters:
         """Parameters of joint fits of models with some of `effects`. `presets`: those of the search, unless others are given."""
         free = self.presets if presets is None else presets
-        own = self.declared
-        return JointParameters.of(self.problem, self.unknowns, self.bounds, effects, self.extent, free, own)
+        own = self.declared, self.of_unknowns
+        return JointParameters.of(self.problem, self.unknowns, self.bounds, effects, self.extent, free, *own)
+
+    def prior_records(self, presets: bool, level: float = 1.0) -> dict[str, Prior]:
+        """Priors of unknowns, and of values of presets where these are free, for a fit whose misfit counts in noises.
+
+        `level`: noises that an independent sample may be off by, beside which a prior counts as it would beside the noise alone.
+        """
+        known = {**self.of_unknowns, **(self.presets if presets else {})}
+        return {name: Prior(one.base, one.sigma / level, one.logarithmic) for name, one in known.items()}
 
     def coefficients(self, effect: str) -> list[str]:
         return [name for name in self.problem.names if name.startswith(f"{effect}.")]
@@ -145,7 +154,7 @@ class Search:
         kept = tuple(effect for effect in self.problem.system.effects if effect.effect_name not in gone)
         system = dataclasses.replace(self.problem.system, effects=kept)
         own = self.problem
-        problem = Problem.build(system, own.batch, own.noise_sigma, own.offset, priors=priors)
+        problem = own.with_system(system, priors=priors)
         return problem, [self.problem.names.index(name) for name in problem.names]
 
     def fit(
@@ -157,16 +166,18 @@ class Search:
         settled: float = 0.0,
         hops: bool = False,
         presets: bool = False,
+        level: float = 1.0,
     ) -> tuple[list[Fit], np.ndarray]:
         """Fit every start: (fits with full parameter vectors, misfit of all runs at each, (S, R, N)).
 
         `enough`, `settled`: relative and absolute tolerance of the cost. `hops`: each from points near its end as well
         (`fit.starts.perturbed_restarts`). `presets`: whether values of presets are free, within their priors against the noise.
+        `level`: as of `prior_records`.
         """
         enough = self.config.convergence if enough is None else enough
         freed = self.presets if presets else {}
-        priors = {name: Prior(one.base, one.sigma, one.logarithmic) for name, one in freed.items()}
-        problem, index = self.restricted([name for start in starts for name in start.effects], priors)
+        every = [name for start in starts for name in start.effects]
+        problem, index = self.restricted(every, self.prior_records(presets, level))
         tasks = [
             problem.task([*self.free(start.effects), *freed], self.bounds, start.values[index], start.weights)
             for start in starts
@@ -182,7 +193,7 @@ class Search:
 
     def base(self, start: np.ndarray, seed: int) -> Fit:
         """The base model fitted, from `start` and from many points of its box."""
-        problem, index = self.restricted(())
+        problem, index = self.restricted((), self.prior_records(presets=False))
         here = eqx.tree_at(lambda one: one.system, problem, problem.system_at(jnp.asarray(start[index])))
         fits = multistart(
             here,
@@ -219,7 +230,7 @@ class Search:
         batch = self.held_out
         assert batch is not None
         problem, index = self.restricted(effects)
-        there = Problem.build(problem.system, batch, problem.noise_sigma, problem.offset)
+        there = problem.with_system(problem.system, batch)
         mask = np.asarray(batch.mask)
         return [split_runs(misfit, mask) for misfit in misfits(there, [one[index] for one in values])]
 

@@ -33,7 +33,7 @@ def outlier_runs(setting: Search, model: Model, names: Sequence[str]) -> tuple[O
     mask = np.asarray(problem.batch.mask)
     own, index = setting.restricted(model.effects)
     (whole,) = misfits(own, [model.values[index]])
-    worst = np.argsort(-(whole**2).sum(axis=1), kind="stable")[: config.outlier_most_runs]
+    worst = np.argsort(-(own.by_run(whole) ** 2).sum(axis=1), kind="stable")[: config.outlier_most_runs]
     everyone = np.arange(runs)
     places = [setting.inside(model)]
     if not model.effects:
@@ -50,7 +50,7 @@ def outlier_runs(setting: Search, model: Model, names: Sequence[str]) -> tuple[O
     outliers = []
     for first, run in zip(range(0, len(starts), len(places)), worst, strict=True):
         best = min(range(first, first + len(places)), key=lambda k: fits[k].cost)
-        left, others = found[best], everyone != run
+        left, others = found[best], own.owner != run
         outliers.append(
             OutlierRun(
                 names[run],
@@ -58,7 +58,7 @@ def outlier_runs(setting: Search, model: Model, names: Sequence[str]) -> tuple[O
                 setting.all_noise(left[others], mask[others]),
                 _rms(whole[others], mask[others]),
                 _rms(left[others], mask[others]),
-                _rms(left[[run]], mask[[run]]),
+                _rms(left[~others], mask[~others]),
             )
         )
     outliers.sort(key=lambda one: one.others_without / one.others_with)
@@ -74,10 +74,10 @@ def _near(setting: Search, left: np.ndarray, start: Start, whole: np.ndarray) ->
     """Whether a fit is within `outlier_reach` of noise in the runs that it has, or of an influential run's fall of their error."""
     config = setting.config
     assert start.weights is not None
-    others = start.weights > 0.0
+    others = start.weights[setting.problem.owner] > 0.0
     mask = np.asarray(setting.problem.batch.mask)[others]
     error = _rms(left[others], mask) / config.outlier_reach
-    influential = len(left) >= config.influential_least_runs and error * config.influential_ratio < _rms(
+    influential = len(start.weights) >= config.influential_least_runs and error * config.influential_ratio < _rms(
         whole[others], mask
     )
     return influential or error < config.white_noise_ratio * float(setting.problem.noise_sigma)

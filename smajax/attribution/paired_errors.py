@@ -55,7 +55,9 @@ def runs_compared(
 ) -> Comparison:
     """How the extended model of `new` predicts these runs beside the model `which` of `old`, the same runs."""
     return compared(
-        [run.measured - run.after for run in new], [run.measured - getattr(run, which) for run in old], config
+        [one for run in new for one in run.residuals("after")],
+        [one for run in old for one in run.residuals(which)],
+        config,
     )
 
 

@@ -34,13 +34,27 @@ def _one_force(problem: Problem, lowest: float, highest: float) -> bool:
     return bool(np.ptp(forces) <= SAME_FORCE * forces.max())
 
 
+def _whole_way(problem: Problem, lowest: float, highest: float) -> tuple[float, float]:
+    """Between which positions a load moves whose position is not measured; of what does not move `lowest` and `highest`."""
+    load, wire = problem.system.load, problem.system.wire
+    if not isinstance(load, AbstractMovingLoad):
+        return lowest, highest
+    start = float(load.start())
+    return start, start + float(load.travel(wire, wire.constitutive.recoverable_strain))
+
+
 def extent_of(problem: Problem) -> Extent:
     """Length of a typical run, range of all readings, the increment at which they lie, the lowest and highest of them, and whether the load is one force."""
     batch = problem.batch
-    mask = np.asarray(batch.mask) > 0
-    readings = [row[valid] for row, valid in zip(problem.measured, mask, strict=True) if valid.any()]
+    names = (problem.system.load.reading[0], "reading")  # effects of a sensor are of the load's own
+    which = next((place for place, name in enumerate(batch.outputs) if name in names), None)
+    series = slice(which or 0, None, len(batch.outputs))
+    mask = np.asarray(batch.mask)[series] > 0
+    readings = [row[valid] for row, valid in zip(problem.measured[series], mask, strict=True) if valid.any()]
+    noise = np.asarray(problem.noise)[series] / problem.scale_of_series[series]
     stroke = max(float(np.ptp(one)) for one in readings)
-    increment = likeliest_increment(readings, float(np.median(problem.noise)))
+    increment = likeliest_increment(readings, float(np.median(noise)))
     lowest, highest = (float(end([end(one) for one in readings])) for end in (np.min, np.max))
-    one_force = _one_force(problem, lowest, highest)
+    ends = (lowest, highest) if which is not None else _whole_way(problem, lowest, highest)
+    one_force = _one_force(problem, *ends)
     return Extent(float(np.median(mask.sum(axis=1)) * batch.dt), stroke, increment, lowest, highest, one_force)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.attribution.averaged_prediction import Averaged, likely_models, prediction_error
+from smajax.attribution.averaged_prediction import Averaged, likely_models, prediction_errors
 from smajax.attribution.found import ParametersFound
 from smajax.attribution.job import Job
 from smajax.attribution.joint_search import JointSearch
@@ -44,8 +44,8 @@ def saved_model(
         _likely(job, search, one, model.values if one.effects == own else one.values, weight)
         for one, weight in weighted
     ]
-    (output,) = job.experiment.outputs[:1]
-    several = len(job.fit_runs) > 1  # else none could be left out
+    # Of one run none could be left out.
+    missed = prediction_errors(setting, model) if len(job.fit_runs) > 1 else [None] * len(job.experiment.outputs)
     return actuator_model(
         job.experiment,
         likely,
@@ -57,8 +57,9 @@ def saved_model(
                 output.unit,
                 output.noise_sigma,
                 output.offset,
-                rounded(prediction_error(setting, model)) if several else None,
+                None if error is None else rounded(error),
             )
+            for output, error in zip(job.experiment.outputs, missed, strict=True)
         ],
         range_of((run, states[run.name]) for run in job.fit_runs),
     )

@@ -15,7 +15,6 @@ from smajax.attribution.model_fits import Model, Search, Start, base_value
 from smajax.fit.integration import IntegrationError, choose_integration, described, integration_error
 from smajax.fit.packed_runs import RunBatch, halved
 from smajax.fit.predicted import predicted_at
-from smajax.fit.problem import Problem
 from smajax.model.effects.library import LIBRARY
 from smajax.simulation.steppers import Integration
 
@@ -41,7 +40,7 @@ def gain_kept_at_half_step(setting: Search, new: Model, old: Model) -> float:
         (fit,), _ = setting.fit([Start(partner, values)], "checking at half the step")
         without = min(without, fit.cost)
     problem, index = setting.restricted(new.effects)
-    fine = Problem.build(problem.system, _finer(problem.batch), problem.noise_sigma, problem.offset)
+    fine = problem.with_system(problem.system, _finer(problem.batch))
     misfit = problem.centred(problem.measured - predicted_at(fine, [new.values[index]])[0][:, ::2])
     cost = float(np.sum((np.asarray(misfit) / np.asarray(problem.noise)) ** 2))
     return (without - cost) / (without - new.cost) if without > new.cost else 0.0

@@ -34,7 +34,6 @@ from smajax.core.whiteness import correlation_time, split_runs
 from smajax.data.experiment.record import Prior
 from smajax.fit.levenberg_marquardt import FitSettings
 from smajax.fit.predicted import misfits
-from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.fit.starts import nearest
 from smajax.fit.uncertainty import covariance_of, uncertainty
@@ -59,7 +58,8 @@ def with_terms(setting: Search, final: Model) -> tuple[Search, np.ndarray, Sough
     whole = dataclasses.replace(system, effects=(*system.effects, *found.terms))
     own = [name for name in parameters(whole) if name.split(".")[0] in names]
     known = {name: Prior(0.0, setting.config.term_prior_sigma, False) for name in own}
-    problem = Problem.build(whole, plain.batch, plain.noise_sigma, plain.offset, priors=known)
+    known |= setting.prior_records(presets=False)
+    problem = plain.with_system(whole, priors=known)
     bounds = {**setting.bounds, **dict.fromkeys(own, (-1.0, 1.0))}
     unknowns = tuple(setting.free(final.effects))
     search = Search(
@@ -72,6 +72,7 @@ def with_terms(setting: Search, final: Model) -> tuple[Search, np.ndarray, Sough
         setting.noise_given,
         setting.held_out,
         config=setting.config,
+        of_unknowns=setting.of_unknowns,
     )
     return search, problem.start_values(), found
 
@@ -178,7 +179,7 @@ def learnt(setting: Search, fits: TermFits) -> Lacking:
         if model is likeliest or model.effects[-1] in alike
     }
     # One run fits too well to name anything: there is none to predict.
-    several = len(present.left_out) > 1
+    several = search.problem.batch.runs > 1
     enough = log_odds[0] > 0.0 and several and predict[likeliest.effects[-1]] < present.left_out_rmse
     held_out = None
     if enough and search.held_out is not None:

@@ -107,7 +107,7 @@ def candidate_problem(
         inputs, blank, jnp.ones_like(blank), overrides, overridden, batch.dt, batch.outputs, batch.integration
     )
     system = problem.system_at(jnp.asarray(values))
-    return candidates, Problem.build(system, runs_to_try, problem.noise_sigma, problem.offset)
+    return candidates, problem.with_system(system, runs_to_try)
 
 
 def suggestions(

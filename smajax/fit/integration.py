@@ -45,7 +45,7 @@ def _exact(problem: Problem, system: System, per_run: np.ndarray) -> np.ndarray:
 
 def _scale(problem: Problem, mask: np.ndarray) -> np.ndarray:
     """Noise of every series; where it has none a tenth of its stroke, so that a hundredth of the stroke may be left."""
-    noise, measured = np.asarray(problem.noise)[:, 0], np.asarray(problem.batch.output)
+    noise, measured = np.asarray(problem.noise)[:, 0], problem.measured * problem.scale_of_series
     high, low = np.where(mask, measured, -np.inf).max(axis=1), np.where(mask, measured, np.inf).min(axis=1)
     stroke = np.where(mask.any(axis=1), high - low, 0.0)
     return np.where(noise > 0.0, noise, np.maximum(0.1 * stroke, 1e-300))
@@ -57,8 +57,9 @@ def _error(problem: Problem, difference: np.ndarray, integration: Integration) -
     rms = np.sqrt((centred**2).sum(axis=1) / np.maximum(mask.sum(axis=1), 1))
     names = problem.batch.outputs
     share = float((rms / _scale(problem, mask)).max())
-    by_output = {name: float(rms[k :: len(names)].max()) for k, name in enumerate(names)}
-    largest = {name: float(np.abs(centred[k :: len(names)]).max()) for k, name in enumerate(names)}
+    own = problem.scale_of_series
+    by_output = {name: float((rms / own[:, 0])[k :: len(names)].max()) for k, name in enumerate(names)}
+    largest = {name: float(np.abs(centred / own)[k :: len(names)].max()) for k, name in enumerate(names)}
     # A state that is not finite is as wrong as can be.
     share = share if np.isfinite(share) else np.inf
     return IntegrationError(by_output, largest, share, described(integration), limit=LARGEST)

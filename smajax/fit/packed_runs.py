@@ -129,8 +129,14 @@ def _compiled_runs(
 
 def simulate_batch(system: System, batch: RunBatch) -> Trajectory:
     """One trajectory per run, numpy's arrays of shape (R, N); outside of `jit`, `vmap` and `grad`."""
-    runs = [run for _, run in _compiled_runs(system, batch, batch.override_names, np.asarray(batch.overrides))]
-    return jax.tree.map(lambda *leaves: np.stack(leaves), *runs)
+    return simulate_with_outputs(system, batch)[0]
+
+
+def simulate_with_outputs(system: System, batch: RunBatch) -> tuple[Trajectory, np.ndarray]:
+    """(one trajectory per run, its leaves of shape (R, N); what the sensors of `batch` show, (series, N)), numpy's arrays."""
+    runs = list(_compiled_runs(system, batch, batch.override_names, np.asarray(batch.overrides)))
+    outputs = [np.asarray(sensor_output(here, run, name)) for here, run in runs for name in batch.outputs]
+    return jax.tree.map(lambda *leaves: np.stack(leaves), *(run for _, run in runs)), np.stack(outputs)
 
 
 def states_by_run(packed: Trajectory, runs: Sequence[Run], names: Sequence[str]) -> dict[str, dict[str, np.ndarray]]:

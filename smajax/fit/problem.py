@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, NamedTuple, TypeVar
@@ -70,6 +71,8 @@ class Problem(eqx.Module):
     offset: tuple[bool, ...] = eqx.field(static=True)  # of each output
     per_run: PerRun
     priors: Priors
+    # What the misfits of each output are multiplied by (`in_first_noises`); None: nothing.
+    scale: Float[Array, " output"] | None = None
 
     @classmethod
     def build(
@@ -86,6 +89,43 @@ class Problem(eqx.Module):
         names = (*parameters(system), *per_run.full_names)
         zero = (offset,) * len(batch.outputs) if isinstance(offset, bool) else offset
         return cls(system, names, batch, jnp.asarray(noise_sigma), zero, per_run, Priors.of(names, priors))
+
+    def with_system(
+        self,
+        system: System,
+        batch: RunBatch | None = None,
+        per_run: PerRun | None = None,
+        priors: Mapping[str, Prior] = MappingProxyType({}),
+    ) -> Problem:
+        """The same outputs, their noise and zeros, by another model. `batch`: of other runs than these."""
+        whole = Problem.build(system, batch or self.batch, self.noise_sigma, self.offset, per_run, priors)
+        return dataclasses.replace(whole, scale=self.scale)
+
+    def in_first_noises(self) -> Problem:
+        """The same with the misfits of every output in the unit of the first: over their own noise, times the noise of the first.
+
+        One number is then the noise of all. Of one output nothing changes.
+        """
+        outputs = len(self.batch.outputs)
+        if outputs == 1:
+            return self
+        sigma = np.broadcast_to(np.asarray(self.noise_sigma), (outputs,))
+        return dataclasses.replace(self, noise_sigma=jnp.asarray(sigma[0]), scale=jnp.asarray(sigma[0] / sigma))
+
+    @property
+    def owner(self) -> np.ndarray:
+        """Number of the run of each series, (series,)."""
+        return np.repeat(np.arange(self.batch.runs), len(self.batch.outputs))
+
+    @property
+    def scale_of_series(self) -> np.ndarray:
+        """What the misfits of each series are multiplied by, (series, 1)."""
+        each = np.ones(len(self.batch.outputs)) if self.scale is None else np.asarray(self.scale)
+        return np.tile(each, self.batch.runs)[:, None]
+
+    def by_run(self, series: np.ndarray) -> np.ndarray:
+        """(series, N) -> (runs, outputs N): the outputs of a run after one another."""
+        return series.reshape(self.batch.runs, -1)
 
     @property
     def noise(self) -> Float[Array, "series 1"]:
@@ -168,4 +208,5 @@ class Problem(eqx.Module):
             total = xp.sum(weight, axis=-1)
             best = xp.sum(raw * weight, axis=-1) / xp.where(total > 0.0, total, 1.0)
             raw = raw - xp.where(xp.asarray(np.tile(self.offset, self.batch.runs)), best, 0.0)[..., None]
-        return raw * mask
+        scaled = raw if self.scale is None else raw * xp.tile(xp.asarray(self.scale), self.batch.runs)[:, None]
+        return scaled * mask

@@ -38,12 +38,17 @@ def _fitted(result: ParameterFinding | None) -> list[float | None]:
 
 def findings_runs(findings: Findings) -> str:
     """Inputs, measurement and both models of every run, one after another."""
-    seen = {name: findings.output_unit for name in ("measured", "before", "after")}
-    series = [
-        (run.name, run.role, {"time": run.time, **run.inputs, **{name: getattr(run, name) for name in seen}})
-        for run in findings.runs
-    ]
-    return _runs(series, seen)
+    models = ("measured", "before", "after")
+    units = dict.fromkeys(models, findings.output_unit)
+    series = []
+    for run in findings.runs:
+        columns = {"time": run.time, **run.inputs, **{name: getattr(run, name) for name in models}}
+        for one in run.others:
+            for name in models:
+                units[f"{one.name} {name}"] = one.unit
+                columns[f"{one.name} {name}"] = getattr(one, name)
+        series.append((run.name, run.role, columns))
+    return _runs(series, units)
 
 
 def identified_parameters(result: Identified) -> str:

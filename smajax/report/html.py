@@ -200,6 +200,30 @@ def _runs(findings: Findings) -> list[dict[str, Any]]:
     ]
 
 
+def _other_outputs(findings: Findings) -> list[dict[str, Any]]:
+    """One row for each output beside the first, and run."""
+    rows = []
+    for run in findings.runs:
+        for one in run.others:
+            inside = None if one.average is None or not one.samples else one.average.coverage
+            rows.append(
+                {
+                    "output": label(one.name),
+                    "run": run.name,
+                    "role": run.role,
+                    "before": shown(one.rmse_before, one.unit, one.name, 3, zeros=True),
+                    "after": shown(one.rmse_after, one.unit, one.name, 3, zeros=True),
+                    "unit": display(one.unit, one.name).unit,
+                    "noise_ratio": Shown(
+                        digits(one.rmse_after / one.noise_sigma, 3, zeros=True), one.rmse_after / one.noise_sigma
+                    ),
+                    "inside": Shown("–" if inside is None else per_cent(inside), inside),
+                    "samples": one.samples,
+                }
+            )
+    return rows
+
+
 def _hysteresis_dpi(number: int, many: bool) -> int:
     """Dots an inch; those that are folded away have the fewest."""
     return pictures.HYSTERESIS if not many else COARSE if number < MANY else FOLDED
@@ -284,6 +308,7 @@ def findings_to_html(findings: Findings, narrative: Narrative | None = None, ste
             evidence_cell=lambda name, value: _evidence_cell(findings, name, value),
             parameters=_parameter_rows(findings),
             runs=_runs(findings),
+            other_outputs=_other_outputs(findings),
             phases=_phase_rows(findings),
             correlations=_correlations(findings),
             unknown=_unknown(findings),

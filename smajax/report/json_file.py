@@ -15,11 +15,13 @@ from smajax.attribution.findings import (
     CoefficientFinding,
     EffectFinding,
     Findings,
+    OutputFinding,
     ParameterFinding,
     ResidualDiagnostics,
     Round,
     RunFinding,
     UnknownTerm,
+    other_outputs,
 )
 from smajax.report.identifiability_words import remark_text
 from smajax.report.narrative import Narrative, narrate
@@ -67,7 +69,7 @@ def _run(run: RunFinding) -> dict[str, Any]:
     return {
         "name": run.name,
         "role": run.role,
-        "samples": len(run.time),
+        "samples": run.samples,
         "duration": run.time[-1] - run.time[0] if len(run.time) else None,
         "rmse_before": run.rmse_before,
         "rmse_after": run.rmse_after,
@@ -75,7 +77,24 @@ def _run(run: RunFinding) -> dict[str, Any]:
         "offset_after": run.offset_after,
         "rmse_average": None if run.average is None else run.average.rmse,
         "band_coverage": None if run.average is None else run.average.coverage,
+        **({"other_outputs": {one.name: _other_output(one) for one in run.others}} if run.others else {}),
     }
+
+
+def _other_output(one: OutputFinding) -> dict[str, Any]:
+    return {
+        "samples": one.samples,
+        "rmse_before": one.rmse_before,
+        "rmse_after": one.rmse_after,
+        "offset_before": one.offset_before,
+        "offset_after": one.offset_after,
+        "rmse_average": None if one.average is None else one.average.rmse,
+        "band_coverage": None if one.average is None else one.average.coverage,
+    }
+
+
+def _sensor(one: OutputFinding) -> dict[str, Any]:
+    return {"name": one.name, "unit": one.unit, "noise_sigma": one.noise_sigma, "noise_how": one.noise_how}
 
 
 def _parameter(result: ParameterFinding) -> dict[str, Any]:
@@ -176,6 +195,7 @@ def findings_to_json(findings: Findings, narrative: Narrative | None = None) -> 
             "noise_sigma": findings.noise_sigma,
             "noise_how": findings.noise_how,
         },
+        **({"other_outputs": [_sensor(one) for one in other_outputs(findings)]} if other_outputs(findings) else {}),
         "integration_error": findings.integration.record(),
         "runs": [_run(run) for run in findings.runs],
         "priors": [dataclasses.asdict(one) for one in findings.priors],

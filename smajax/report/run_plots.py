@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from smajax.attribution.findings import Findings, RunFinding
+from smajax.attribution.findings import Findings, OutputFinding, RunFinding
 from smajax.core.display_units import Display, display, label
 from smajax.model.channels import channel
 from smajax.report.pictures import autocorrelation, nothing_added
@@ -30,8 +30,9 @@ def run_plot(
     output: Panel,
     residual: Panel,
     spans: Sequence[tuple[float, float]] = (),
+    more: Sequence[Panel] = (),
 ) -> SeriesPlot:
-    """One run: output, residual, and the first inputs that vary."""
+    """One run: output, residual, `more` panels, and the first inputs that vary."""
     varying = [name for name, values in inputs.items() if np.ptp(values) > 0.0][:STRIPS]
     strips = tuple(
         Panel(
@@ -42,7 +43,7 @@ def run_plot(
         )
         for name in varying
     )
-    return SeriesPlot(about, time, (output, residual, *strips), spans=tuple(spans))
+    return SeriesPlot(about, time, (output, residual, *more, *strips), spans=tuple(spans))
 
 
 def output_panel(name: str, shown: Display, lines: Sequence[Line], bands: Sequence[Band] = ()) -> Panel:
@@ -62,36 +63,45 @@ def output_alone(plot: SeriesPlot, about: str, of: str, height: int = FIRST) -> 
     return SeriesPlot(about, plot.at, (alone,), plot.axis, plot.spans)
 
 
-def models_of(findings: Findings, run: RunFinding) -> list[tuple[str, np.ndarray, str]]:
-    """The models to draw for one run: name, values, colour. One only when nothing was added."""
+def models_of(findings: Findings, run: RunFinding | OutputFinding) -> list[tuple[str, np.ndarray, str]]:
+    """The models to draw for one output of a run: name, values, colour. One only when nothing was added."""
     if nothing_added(findings):
         return [("base model", run.before, "after")]
     return [("before", run.before, "before"), ("after", run.after, "after")]
 
 
-def _output(findings: Findings, run: RunFinding) -> Panel:
-    shown = display(findings.output_unit, findings.output_name)
-    lines = [measured_line(shown.of(run.measured))]
-    lines += [Line(name, shown.of(values), colour) for name, values, colour in models_of(findings, run)]
+def _panels(
+    findings: Findings, one: RunFinding | OutputFinding, sensor: tuple[str, str, float], held_out: bool
+) -> tuple[Panel, Panel]:
+    """(an output measured and by the models, of a held-out run with the band of the average; what they leave). sensor: name, unit, noise."""
+    name, unit, sigma = sensor
+    shown = display(unit, name)
+    models = models_of(findings, one)
+    lines = [measured_line(shown.of(one.measured))]
+    lines += [Line(model, shown.of(values), colour) for model, values, colour in models]
     bands = []
-    if run.role == "held-out" and run.average is not None:
-        middle, half = shown.of(run.average.reading), shown.of(run.average.half_width)
+    if held_out and one.average is not None:
+        middle, half = shown.of(one.average.reading), shown.of(one.average.half_width)
         bands = [Band("90 % band", middle - half, middle + half, "band", 0.22)]
-    return output_panel(findings.output_name, shown, lines, bands)
+    noise = np.full(len(one.measured), 2.0 * shown.of(sigma))
+    left = [Line(model, shown.of(one.measured - values), colour, 1.0) for model, values, colour in models]
+    residual = residual_panel(shown, left, [Band("noise, ± 2 σ", -noise, noise, "noise", 0.8)])
+    return output_panel(name, shown, lines, bands), residual
 
 
 def over_time(findings: Findings, run: RunFinding) -> SeriesPlot:
-    """Output measured, before and after; the residuals with the noise band; the varying inputs on thin strips.
+    """Output measured, before and after; the residuals with the noise band; the same of other outputs; the varying inputs on thin strips.
 
     Of a held-out run also the band of the averaged prediction.
     """
-    shown = display(findings.output_unit, findings.output_name)
-    noise = np.full(len(run.time), 2.0 * shown.of(findings.noise_sigma))
-    lines = [
-        Line(name, shown.of(run.measured - values), colour, 1.0) for name, values, colour in models_of(findings, run)
-    ]
-    residual = residual_panel(shown, lines, [Band("noise, ± 2 σ", -noise, noise, "noise", 0.8)])
-    return run_plot(f"Run {run.name} over time", run.time, run.inputs, _output(findings, run), residual)
+    held_out = run.role == "held-out"
+    sensor = findings.output_name, findings.output_unit, findings.noise_sigma
+    output, residual = _panels(findings, run, sensor, held_out)
+    more: list[Panel] = []
+    for one in run.others:
+        its, left = _panels(findings, one, (one.name, one.unit, one.noise_sigma), held_out)
+        more += [its, replace(left, name=f"{its.name}: {left.name}")]
+    return run_plot(f"Run {run.name} over time", run.time, run.inputs, output, residual, more=more)
 
 
 def first_plot(findings: Findings) -> SeriesPlot | None:

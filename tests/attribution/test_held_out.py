@@ -27,7 +27,9 @@ def _models(monkeypatch: pytest.MonkeyPatch, errors: dict[str, float]) -> tuple[
     def compare(job: object, setting: object, first: object, final: Any) -> tuple[Any, None, None]:
         values = {"measured": np.zeros(400), "before": -residual(""), "after": -residual("".join(final.effects))}
         rms = {f"rmse_{which}": float(np.sqrt(np.mean(values[which] ** 2))) for which in ("before", "after")}
-        return (SimpleNamespace(name="held", role="held-out", time=np.arange(400), **values, **rms),), None, None
+        zero = {"offset_before": 0.0, "offset_after": 0.0}
+        run = RunFinding(name="held", role="held-out", time=np.arange(400), inputs={}, states={}, **values, **rms, **zero)
+        return (run,), None, None
 
     def model(effects: str) -> Any:
         return SimpleNamespace(effects=tuple(effects))

@@ -64,7 +64,7 @@ def made_run(name: str, role: Role, seed: int, samples: int = 1200) -> RunFindin
         rmse_before=float(np.sqrt(np.mean((measured - before) ** 2))),
         rmse_after=float(np.sqrt(np.mean((measured - after) ** 2))),
         average=AveragedRun(
-            after, np.full(samples, 2.0 * NOISE), float(np.sqrt(np.mean((measured - after) ** 2))), 0.93
+            after, np.full(samples, 2.0 * NOISE), float(np.sqrt(np.mean((measured - after) ** 2))), 0.93, samples
         ),
     )
 

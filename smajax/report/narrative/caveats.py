@@ -114,8 +114,12 @@ def of_bounds(findings: Findings) -> Iterator[str]:
 
 
 def of_priors_left(findings: Findings) -> Iterator[str]:
-    """Values of presets that end far from what data sheets leave open."""
-    far = {one.name: text for one in findings.after if (text := far_text(findings, one))}
+    """Values of presets that end far from what data sheets leave open, and unknowns that end far from their priors."""
+    texts = {one: text for one in findings.after if (text := far_text(findings, one))}
+    own = [f"{one.name} ends {text}" for one, text in texts.items() if one.prior_of_unknown]
+    if own:
+        yield f"Mind: {and_listed(own)}. The runs contradict what the experiment file says of it, or it stands in for what the model lacks."
+    far = {one.name: text for one, text in texts.items() if not one.prior_of_unknown}
     if not far:
         return
     ends = [f"{name} ends {text}" for name, text in far.items()]
@@ -168,7 +172,7 @@ def held_out_off(findings: Findings) -> list[RunFinding]:
         run
         for run in findings.runs
         if run.role == "held-out"
-        and run.rmse_after > (config.held_out_ratio + config.held_out_chance / np.sqrt(2.0 * len(run.time))) * level
+        and run.rmse_after > (config.held_out_ratio + config.held_out_chance / np.sqrt(2.0 * run.samples)) * level
     ]
 
 

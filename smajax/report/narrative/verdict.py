@@ -4,15 +4,27 @@ from __future__ import annotations
 
 import numpy as np
 
-from smajax.attribution.findings import Findings, Rejected, Role, Verdict, coverage, pooled_rmse
+from smajax.attribution.findings import (
+    Findings,
+    OutputFinding,
+    Rejected,
+    Role,
+    Verdict,
+    coverage,
+    other_outputs,
+    pooled,
+    pooled_rmse,
+    pooled_rmse_of,
+)
 from smajax.attribution.record_error import OutlierRun
+from smajax.core.display_units import label
 from smajax.core.wording import and_listed, per_cent
 from smajax.model.effects.library import LIBRARY
 from smajax.report.narrative import caveats
 from smajax.report.narrative.record_errors import of_wrong_records
 from smajax.report.narrative.rounds import reason_text
 from smajax.report.narrative.unknown import unknown_sentences
-from smajax.report.narrative.values import error_text
+from smajax.report.narrative.values import error_text, value_text
 from smajax.report.range_words import range_sentences
 
 
@@ -165,8 +177,7 @@ def _of_the_band(findings: Findings) -> list[str]:
     if inside is None:
         return []
     averages = [run.average for run in findings.runs if run.role == "held-out" and run.average is not None]
-    samples = sum(len(one.reading) for one in averages)
-    error = float(np.sqrt(sum(one.rmse**2 * len(one.reading) for one in averages) / samples))
+    error = pooled((one.rmse, one.samples) for one in averages)
     count = len(findings.averaged)
     who = f"the average of the {count} likely models" if count > 1 else "the model"
     return [
@@ -193,4 +204,19 @@ def _errors(findings: Findings) -> list[str]:
                 + (" (no fit saw them, but they decided what is not named)." if decided else ".")
             )
     sentences += _of_the_band(findings)
-    return [*sentences, f"Measurement noise: {error_text(findings, findings.noise_sigma)} ({findings.noise_how})."]
+    sentences.append(f"Measurement noise: {error_text(findings, findings.noise_sigma)} ({findings.noise_how}).")
+    return [*sentences, *(_of_another_output(findings, one) for one in other_outputs(findings))]
+
+
+def _of_another_output(findings: Findings, one: OutputFinding) -> str:
+    """The errors of an output beside the first, of fit runs and held-out runs, and its noise."""
+    roles: tuple[Role, ...] = ("fit", "held-out")
+    parts = []
+    for role in roles:
+        before, after = (pooled_rmse_of(findings.runs, one.name, role, which) for which in ("before", "after"))
+        if np.isfinite(before):
+            text = value_text(before, one.unit, one.name)
+            changed = f" before, {value_text(after, one.unit, one.name)} after" if findings.added else ""
+            parts.append(f"on the {role} runs {text}{changed}")
+    noise = f"its noise is {value_text(one.noise_sigma, one.unit, one.name)} ({one.noise_how})"
+    return f"Error of the {label(one.name)}: {'; '.join([*parts, noise])}."

@@ -1,0 +1,87 @@
+"""One measured run beside the base and the extended model, output by output: numbers, of numpy, SI."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+Role = Literal["fit", "held-out"]
+
+
+@dataclass(frozen=True)
+class AveragedRun:
+    """One run by the average of the likely models, arrays of shape (n,), SI."""
+
+    reading: np.ndarray
+    half_width: np.ndarray  # of the band about it in which nine of ten measured samples are expected
+    rmse: float
+    coverage: float  # share of the measured samples inside the band
+    samples: int  # measured ones
+
+
+@dataclass(frozen=True)
+class OutputFinding:
+    """Another measured output of a run beside the two models; as the first one's in `RunFinding`."""
+
+    name: str
+    unit: str  # SI
+    noise_sigma: float
+    noise_how: str
+    scale: float  # noise of the first output over its own
+    measured: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    offset_before: float
+    offset_after: float
+    rmse_before: float
+    rmse_after: float
+    average: AveragedRun | None = None
+
+    @property
+    def samples(self) -> int:
+        """Measured ones."""
+        return int(np.isfinite(self.measured).sum())
+
+
+@dataclass(frozen=True)
+class RunFinding:
+    """One measured run beside the two models; every array has shape (n,) on the same clock."""
+
+    name: str
+    role: Role
+    time: np.ndarray  # s
+    inputs: dict[str, np.ndarray]  # SI, by channel name
+    measured: np.ndarray  # SI unit of the first output; nan where a sample is missing
+    before: np.ndarray  # base model, the run's own offset included
+    after: np.ndarray  # extended model; equal to `before` when nothing was added
+    states: dict[str, np.ndarray]  # of the model after: temperature (C), martensite_fraction (-), stress (Pa)
+    offset_before: float
+    offset_after: float
+    rmse_before: float
+    rmse_after: float
+    average: AveragedRun | None = None
+    others: tuple[OutputFinding, ...] = ()  # the other outputs, where there are several
+
+    @property
+    def samples(self) -> int:
+        """Measured ones of the first output."""
+        return int(np.isfinite(self.measured).sum())
+
+    def residuals(self, which: Literal["before", "after"]) -> list[np.ndarray]:
+        """What a model leaves of the measured samples of every output, those of others in noises times the first one's."""
+        every = [(1.0, self.measured, getattr(self, which))]
+        every += [(one.scale, one.measured, getattr(one, which)) for one in self.others]
+        found = [scale * (measured - model)[np.isfinite(measured)] for scale, measured, model in every]
+        return [one for one in found if one.size]
+
+
+def pooled(parts: Iterable[tuple[float, int]]) -> float:
+    """Root mean square of parts of (root mean square, samples) each; NaN without any."""
+    kept = [(rms, samples) for rms, samples in parts if samples]
+    return (
+        float(np.sqrt(sum(rms**2 * samples for rms, samples in kept) / sum(n for _, n in kept))) if kept else math.nan
+    )
