@@ -19,7 +19,8 @@ def assumed(job: Job, presets: Collection[str] = ()) -> tuple[AssumedParameter, 
     """Parameters of the base model that are not fitted and that no log gives. `presets`: those of presets that are fitted."""
     experiment, model = job.experiment, base_model(job.experiment)
     logged = {own for own, channel in REPLACED.items() if all(channel in run.inputs for run in experiment.runs)}
-    table = {name: entry for name, entry in parameters(model).items() if name not in {*job.unknowns, *logged, *presets}}
+    unknown = {name.split("[")[0] for name in job.unknowns}
+    table = {name: entry for name, entry in parameters(model).items() if name not in {*unknown, *logged, *presets}}
     values = np.asarray(get_parameters(model, list(table))) if table else ()
     own = set.intersection(*({*run.parameters} for run in experiment.runs))
     return tuple(
@@ -40,7 +41,8 @@ def expansion_not_given(job: Job, fitted: Mapping[str, float] = MappingProxyType
     """
     experiment, model = job.experiment, base_model(job.experiment)
     names = ("thermal_modulus", "young_modulus_martensite", "young_modulus_austenite")
-    own = {*experiment.parameters, *job.unknowns, *(name for run in experiment.runs for name in run.parameters)}
+    unknown = (name.split("[")[0] for name in job.unknowns)
+    own = {*experiment.parameters, *unknown, *(name for run in experiment.runs for name in run.parameters)}
     if not set(names) <= parameters(model).keys() or names[0] in own:
         return None
     held = dict(zip(names, get_parameters(model, names), strict=True))

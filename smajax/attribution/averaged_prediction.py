@@ -23,6 +23,7 @@ from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.likely_models_check import checked
 from smajax.attribution.model_fits import Model, Search
+from smajax.attribution.own_values import on_runs
 from smajax.fit.packed_runs import RunBatch
 from smajax.fit.prediction_band import BAND, averaged_band, reading_of
 
@@ -59,10 +60,11 @@ def averaged(
     batch: RunBatch,
     base: Model | None = None,
     samples: Sequence[int] | None = None,
+    runs: Sequence[str] = (),
 ) -> Averaged:
     """Every run of `batch`, held-out ones included, by the average of the likely models.
 
-    `samples` of each run on the clock; None: as many as are measured.
+    `samples` of each run on the clock; None: as many as are measured. `runs`: their names, where runs have values of their own.
 
     With the `base` model those that carry weight are checked as the final model was (`likely_models_check`).
     """
@@ -70,12 +72,12 @@ def averaged(
     dropped: tuple[DroppedModel, ...] = ()
     if base is not None:
         models, dropped = checked(setting, search, base, final, models)
-    problem, index = setting.restricted([effect for model, _ in models for effect in model.effects])
-    problem = problem.with_system(problem.system, batch)
     own = search.joint.ordered(final.effects)
+    effects = [effect for model, _ in models for effect in model.effects]
+    each = [(final if model.effects == own else model).values for model, _ in models]
+    problem, points = on_runs(setting, effects, each, batch, runs)
     readings, variances = [], []
-    for model, _ in models:
-        values = (final if model.effects == own else model).values[index]
+    for (model, _), values in zip(models, points, strict=True):
         covariance = model.covariance(search.error(model) ** 2)
         found = reading_of(problem, values, model.names, model.scales, covariance)
         readings.append(found.reading)

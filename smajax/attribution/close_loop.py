@@ -36,7 +36,6 @@ from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.neutral import check_neutral
 from smajax.attribution.outlier_run import outlier_runs
 from smajax.attribution.record_error import OutlierRun, RecordError
-from smajax.attribution.refusal import refuse_keys_of_identify
 from smajax.attribution.saved_model import fit_run_states, saved_model
 from smajax.attribution.step_size_check import finer_integration, integration_error_of
 from smajax.attribution.unknown_term import Lacking, in_place_of, unknown_terms
@@ -121,7 +120,6 @@ def close_loop(  # keywords, which a caller names one by one
             text = f"`{name}` changes nothing: sets of effects share a program; it goes in version 0.3"
             warnings.warn(text, DeprecationWarning, stacklevel=2)
     began = clock.monotonic()
-    refuse_keys_of_identify(experiment)
     check_neutral()
     cache = ResultCache(memory)
     settings = config or AttributionConfig()
@@ -168,6 +166,7 @@ def prepared(  # the stage's inputs, each once
         progress=progress,
         noise_given=all(output.noise_given for output in experiment.outputs),
         held_out=job.held_out,
+        held_out_runs=tuple(run.name for run in experiment.runs if run.role != "fit"),
         config=config,
         declared=experiment.priors,
         of_unknowns=of_unknowns(experiment),
@@ -328,7 +327,8 @@ def findings_of(
     average = Averaged()
     if len(job.fit_runs) > 1 and not brief:  # else none can be left out, which the band is made of
         samples = [len(run.time) for run in experiment.runs]
-        average = averaged(setting, outcome.search, final, every_run(job), base, samples)
+        names = [run.name for run in experiment.runs]
+        average = averaged(setting, outcome.search, final, every_run(job), base, samples, names)
         runs = with_averages(runs, average.runs)
     states = {run.name: run.states for run in runs}
     extended_model = base_model = saved_model(job, setting, outcome.search, final, after, average, states)

@@ -104,7 +104,8 @@ def separating_runs(
     candidates, there = candidate_problem(problem, one.values[index], runs)
     if not candidates or not others:
         return [("", float("nan"))] * len(others)
-    first, *rest = predicted_at(there, [model.values[index] for model in (one, *others)])
+    # Values of single runs, which come last, are in the candidates already.
+    first, *rest = predicted_at(there, [model.values[index][: len(there.names)] for model in (one, *others)])
     found = []
     for second in rest:
         difference = there.by_run(there.centred(first - second))

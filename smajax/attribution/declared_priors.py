@@ -5,16 +5,18 @@ from __future__ import annotations
 import math
 
 from smajax.data.experiment.record import DeclaredPriors, Experiment, PriorSpread
+from smajax.fit.experiment_problem import free_by_name
 from smajax.model.effects.prior_width import CoefficientPrior
 
 NONE_DECLARED = DeclaredPriors()
 
 
 def of_unknowns(experiment: Experiment) -> dict[str, CoefficientPrior]:
-    """Of the unknowns that have a prior."""
+    """Of the unknowns that have a prior, those with one value for each fit run as `name[run]`."""
+    runs = [run for run in experiment.runs if run.role == "fit"]
     return {
-        one.name: CoefficientPrior(one.prior.mean, one.prior.sigma, one.prior.logarithmic)
-        for one in experiment.unknowns
+        name: CoefficientPrior(one.prior.mean, one.prior.sigma, one.prior.logarithmic)
+        for name, one in free_by_name(experiment, runs).items()
         if one.prior is not None
     }
 

@@ -17,6 +17,7 @@ from smajax.attribution.prior_finding import PriorFinding
 from smajax.core.parameters import parameter_values, parameters
 from smajax.data.experiment.record import DeclaredPriors
 from smajax.fit.base_model import base_model
+from smajax.fit.experiment_problem import free_by_name
 from smajax.fit.preset_priors import fitted_priors, preset_priors
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.fit.uncertainty import Uncertainty, uncertainty
@@ -48,11 +49,13 @@ def parameters_found(job: Job, setting: Search, model: Model, start: np.ndarray,
     values = {name: float(model.values[index(name)]) for name in names}
     known = uncertainty(at, names, values, job.bounds)
     table = parameters(job.problem.system)
+    units = {name: entry.unit for name, entry in table.items()}
+    units |= {name: one.unit for name, one in free_by_name(job.experiment, job.fit_runs).items()}
     return ParametersFound(
         tuple(
             ParameterFinding(
                 name,
-                table[name].unit,
+                units[name],
                 values[name],
                 known.standard_error[name],
                 *job.bounds[name],

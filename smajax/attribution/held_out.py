@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -22,6 +22,7 @@ from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.joint_stage import final_model, without
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
+from smajax.attribution.own_values import on_runs
 from smajax.attribution.paired_errors import Comparison, runs_compared
 from smajax.attribution.residual_diagnostics import diagnosed
 from smajax.core.parameters import parameter_values
@@ -82,9 +83,11 @@ def _beside(new: Compared, old: Compared, setting: Search, which: Literal["befor
     return runs_compared(mine, theirs, which, setting.config)
 
 
-def _simulated(setting: Search, model: Model | FittedModel, batch: RunBatch) -> tuple[Trajectory, np.ndarray]:
-    problem, index = setting.restricted(model.effects)
-    return simulate_with_outputs(problem.system_at(jnp.asarray(model.values[index])), batch)
+def _simulated(
+    setting: Search, model: Model | FittedModel, batch: RunBatch, runs: Sequence[str]
+) -> tuple[Trajectory, np.ndarray]:
+    there, (values,) = on_runs(setting, model.effects, [model.values], batch, runs)
+    return simulate_with_outputs(there.system_at(jnp.asarray(values)), there.with_own_values(values))
 
 
 def every_run(job: Job) -> RunBatch:
@@ -96,7 +99,8 @@ def every_run(job: Job) -> RunBatch:
 def compare(job: Job, setting: Search, first: Model, final: Model | FittedModel) -> Compared:
     """Every run, held-out ones included, by both models; and the diagnostics of the fit runs' residuals."""
     experiment, batch = job.experiment, every_run(job)
-    simulated = {which: _simulated(setting, model, batch) for which, model in (("before", first), ("after", final))}
+    names = [run.name for run in experiment.runs]
+    simulated = {which: _simulated(setting, one, batch, names) for which, one in (("before", first), ("after", final))}
     shown = {which: states_by_run(one, experiment.runs, SHOWN) for which, (one, _) in simulated.items()}
     runs = []
     residuals: dict[str, list[np.ndarray]] = {"before": [], "after": []}

@@ -132,8 +132,9 @@ def _fits(setting: Search, host: Model, runs: Sequence[str]) -> list[tuple[_Even
     if not kinds:
         return []
     whole = with_effects(system, [kind.coefficient.split(".")[0] for kind in kinds])
-    start = jnp.zeros((len(runs), len(kinds)))
-    per_run = PerRun(tuple(kind.coefficient for kind in kinds), tuple(runs), start)
+    before = own.per_run_at(jnp.asarray(host.values[slots]))
+    start = jnp.concatenate([before, jnp.zeros((len(runs), len(kinds)))], axis=1)
+    per_run = PerRun((*own.per_run.names, *(kind.coefficient for kind in kinds)), tuple(runs), start)
     problem = own.with_system(whole, per_run=per_run)
     (left,) = misfits(own, [host.values[slots]])
     worst = np.argsort(-(own.by_run(left) ** 2).sum(axis=1), kind="stable")[:MOST_RUNS]

@@ -11,6 +11,7 @@ from smajax.core.parameters import parameter_values, parameters
 from smajax.data.experiment.record import Experiment, Run
 from smajax.data.model_catalogue import candidates
 from smajax.fit.base_model import base_model
+from smajax.fit.experiment_problem import free_by_name, own_values
 from smajax.fit.integration import choose_integration, unlimited, with_integration
 from smajax.fit.packed_runs import RunBatch, pack
 from smajax.fit.problem import Problem
@@ -53,7 +54,9 @@ def job_of(experiment: Experiment, integration: Integration | None = None) -> Jo
         batch = pack(runs, experiment.step, parameter_values(model))
         sigmas = jnp.asarray([output.noise_sigma for output in experiment.outputs])
         offsets = tuple(output.offset for output in experiment.outputs)
-        whole = Problem.build(model, batch, sigmas if len(sigmas) > 1 else sigmas[0], offsets)
+        whole = Problem.build(
+            model, batch, sigmas if len(sigmas) > 1 else sigmas[0], offsets, own_values(experiment, runs)
+        )
         return whole.in_first_noises()
 
     declared_problem = problem_with(declared)
@@ -68,10 +71,10 @@ def job_of(experiment: Experiment, integration: Integration | None = None) -> Jo
     full = problem.system
     bounds = {entry.name: (entry.low, entry.high) for entry in parameters(full).values()}
     bounds |= {f"{name}.{own}": one for name in names for own, one in LIBRARY[name].candidate.bounds(extent).items()}
-    bounds |= {unknown.name: (unknown.low, unknown.high) for unknown in experiment.unknowns}
+    free = free_by_name(experiment, runs)
+    bounds |= {name: (unknown.low, unknown.high) for name, unknown in free.items()}
     others = tuple(run for run in experiment.runs if run.role != "fit")
     held_out = pack(others, experiment.step, parameter_values(full), unlimited(integration)) if others else None
-    unknowns = tuple(unknown.name for unknown in experiment.unknowns)
     presets, of_presets = values_not_given(experiment, base, bounds)
     bounds |= of_presets
     return Job(
@@ -79,7 +82,7 @@ def job_of(experiment: Experiment, integration: Integration | None = None) -> Jo
         fit_runs=runs,
         problem=problem,
         held_out=held_out,
-        unknowns=unknowns,
+        unknowns=tuple(free),
         bounds=bounds,
         candidates=names,
         presets=presets,

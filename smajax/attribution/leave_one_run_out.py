@@ -92,12 +92,21 @@ def _steps(
     gradient = np.einsum("snp,sn->sp", columns, at.misfit)
     slots = [problem.names.index(name) for name in model.names]
     low, high = np.asarray([joint.bounds[name] for name in model.names]).T
+    # A run's own value stays: without the run nothing says what it is.
+    run_of = {
+        name: number
+        for number, run in enumerate(problem.per_run.runs)
+        for name in model.names
+        if name.endswith(f"[{run}]")
+    }
+    of_series = owner[:: len(problem.batch.outputs)]
+    own = np.asarray([of_series[run_of[name]] if name in run_of else -1 for name in model.names])
     points = []
     for part in range(owner.max() + 1):
         others = gram[owner != part].sum(axis=0) + precision
         step = -np.linalg.solve(others, gradient[owner == part].sum(axis=0)) * model.scales
         point = np.array(values)
-        point[slots] = np.clip(point[slots] + step, low, high)
+        point[slots] = np.clip(point[slots] + np.where(own == part, 0.0, step), low, high)
         points.append(point)
     return points
 

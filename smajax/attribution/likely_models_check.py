@@ -15,6 +15,7 @@ from smajax.attribution.findings import DroppedModel, HeldOutWorse, StepDependen
 from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
+from smajax.attribution.own_values import held_out_residuals
 from smajax.attribution.paired_errors import compared, pooled_rms
 from smajax.attribution.step_size_check import gain_kept_at_half_step
 from smajax.model.effects.library import LIBRARY
@@ -56,7 +57,7 @@ def _on_held_out(
     simpler = [_without_one(search, one) for one in models]
     values = [base.values, *(one.values for one in models), *(one.values for one in simpler if one is not None)]
     every = [effect for one in models for effect in one.effects]
-    basic, *others = setting.held_out_residuals(every, values)
+    basic, *others = held_out_residuals(setting, every, values)
     own, nested = others[: len(models)], iter(others[len(models) :])
     found = {}
     for one, rest, mine in zip(models, simpler, own, strict=True):

@@ -79,6 +79,7 @@ class Search:
     progress: Progress = quiet
     noise_given: bool = True  # by the experiment file; else estimated
     held_out: RunBatch | None = None  # which no fit sees, and which refuse an unknown term in the end
+    held_out_runs: tuple[str, ...] = ()  # their names
     config: AttributionConfig = DEFAULT
     evidence: dict[str, Evidence] = field(default_factory=dict)
     rounds: list[Round] = field(default_factory=list)
@@ -224,15 +225,6 @@ class Search:
     def all_noise(self, misfit: np.ndarray, mask: np.ndarray) -> bool:
         """Whether a misfit (SI) is measurement noise, as far as `mask` goes, both (R, N)."""
         return all_noise(split_runs(misfit, mask), float(self.problem.noise_sigma), self.noise_given, self.config)
-
-    def held_out_residuals(self, effects: Sequence[str], values: Sequence[np.ndarray]) -> list[list[np.ndarray]]:
-        """Residuals of each held-out run (n,), SI, of parameters (P,) of models with some of `effects`."""
-        batch = self.held_out
-        assert batch is not None
-        problem, index = self.restricted(effects)
-        there = problem.with_system(problem.system, batch)
-        mask = np.asarray(batch.mask)
-        return [split_runs(misfit, mask) for misfit in misfits(there, [one[index] for one in values])]
 
     def rmse(self, misfit: np.ndarray) -> float:
         return float(np.sqrt((misfit**2).sum() / np.asarray(self.problem.batch.mask).sum()))

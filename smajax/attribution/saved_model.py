@@ -16,6 +16,7 @@ from smajax.attribution.model_fits import Model, Search
 from smajax.data.model_file.actuator_model import ActuatorModel
 from smajax.data.model_file.of_experiment import actuator_model, range_of, rounded
 from smajax.data.model_file.record import LikelyModel, ModelOutput
+from smajax.data.model_file.values_of_runs import OfRuns
 from smajax.fit.packed_runs import simulate_batch, states_by_run
 from smajax.model.channels import RANGED
 
@@ -44,13 +45,15 @@ def saved_model(
         _likely(job, search, one, model.values if one.effects == own else one.values, weight)
         for one, weight in weighted
     ]
+    fitted = {one.name: one.value for one in found.parameters}
+    scatter = {name: variance**0.5 for name, variance in OfRuns.among(fitted).scatter.items()}
     # Of one run none could be left out.
     missed = prediction_errors(setting, model) if len(job.fit_runs) > 1 else [None] * len(job.experiment.outputs)
     return actuator_model(
         job.experiment,
         likely,
-        job.bounds,
-        {one.name: one.standard_error for one in found.parameters},
+        {name.split("[")[0]: bounds for name, bounds in job.bounds.items()},
+        {**{one.name: one.standard_error for one in found.parameters}, **scatter},
         [
             ModelOutput(
                 output.name,
@@ -68,7 +71,8 @@ def saved_model(
 def fit_run_states(job: Job, setting: Search, model: Model) -> dict[str, dict[str, np.ndarray]]:
     """Temperature and stress of each fit run by `model`, (n,), by the run's name."""
     problem, index = setting.restricted(model.effects)
-    found = simulate_batch(problem.system_at(jnp.asarray(model.values[index])), problem.batch)
+    values = model.values[index]
+    found = simulate_batch(problem.system_at(jnp.asarray(values)), problem.with_own_values(values))
     return states_by_run(found, job.fit_runs, RANGED)
 
 
@@ -77,11 +81,14 @@ def _likely(job: Job, search: JointSearch, model: FittedModel, values: np.ndarra
     covariance = model.covariance(search.error(model) ** 2) * np.outer(model.scales, model.scales)
     declared = job.experiment.declared_effects
     priors = search.joint.prior_records(model.effects)
+    of_runs = OfRuns.among({name: at[name] for name in model.names})
+    names, whole = of_runs.beside(model.names, covariance)
+    shared = [name for name in model.names if "[" not in name]
     return LikelyModel(
         tuple(dict.fromkeys((*declared, *model.effects))),
         weight,
-        {name: at[name] for name in model.names},
-        model.names,
-        covariance,
-        {name: priors[name] for name in model.names if name in priors},
+        {**{name: at[name] for name in shared}, **of_runs.means},
+        names,
+        whole,
+        {name: priors[name] for name in shared if name in priors},
     )

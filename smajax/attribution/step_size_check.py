@@ -15,7 +15,9 @@ from smajax.attribution.model_fits import Model, Search, Start, base_value
 from smajax.fit.integration import IntegrationError, choose_integration, described, integration_error
 from smajax.fit.packed_runs import RunBatch, halved
 from smajax.fit.predicted import predicted_at
+from smajax.fit.problem import Problem
 from smajax.model.effects.library import LIBRARY
+from smajax.model.system import System
 from smajax.simulation.steppers import Integration
 
 MUCH_FINER = 30.0  # tolerances: what a jump gains by chance at one is gone at the other
@@ -40,7 +42,7 @@ def gain_kept_at_half_step(setting: Search, new: Model, old: Model) -> float:
         (fit,), _ = setting.fit([Start(partner, values)], "checking at half the step")
         without = min(without, fit.cost)
     problem, index = setting.restricted(new.effects)
-    fine = problem.with_system(problem.system, _finer(problem.batch))
+    fine = problem.with_system(problem.system, _finer(problem.batch), problem.per_run)
     misfit = problem.centred(problem.measured - predicted_at(fine, [new.values[index]])[0][:, ::2])
     cost = float(np.sum((np.asarray(misfit) / np.asarray(problem.noise)) ** 2))
     return (without - cost) / (without - new.cost) if without > new.cost else 0.0
@@ -56,10 +58,16 @@ def _finer(batch: RunBatch) -> RunBatch:
     )
 
 
+def _at(problem: Problem, values: np.ndarray) -> tuple[System, np.ndarray]:
+    """(the model, each run's own values) at parameters (P,)."""
+    here = jnp.asarray(values)
+    return problem.system_at(here), np.asarray(problem.per_run_at(here))
+
+
 def integration_error_of(setting: Search, final: Model) -> IntegrationError:
     """What the integration leaves in the output of the final model on the fit runs."""
     problem, index = setting.restricted(final.effects)
-    return integration_error(problem, problem.system_at(jnp.asarray(final.values[index])))
+    return integration_error(problem, *_at(problem, final.values[index]))
 
 
 def finer_integration(setting: Search, effects: tuple[str, ...], values: np.ndarray) -> Integration | None:
@@ -68,8 +76,8 @@ def finer_integration(setting: Search, effects: tuple[str, ...], values: np.ndar
     None where it does not, or where none leaves less.
     """
     problem, index = setting.restricted(effects)
-    system = problem.system_at(jnp.asarray(values[np.asarray(index)]))
-    if integration_error(problem, system).small:
+    here = _at(problem, values[np.asarray(index)])
+    if integration_error(problem, *here).small:
         return None
-    finer = choose_integration(problem, system)
+    finer = choose_integration(problem, *here)
     return None if described(finer) == described(problem.batch.integration) else finer

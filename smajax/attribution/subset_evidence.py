@@ -81,7 +81,9 @@ class LinearModel:
         """Posterior mean of all parameters of a model with `subset`."""
         columns = self._columns(subset)
         matrix = self.gram[np.ix_(columns, columns)] + np.diag(self.precision[columns])
-        mean = scipy.linalg.solve(matrix, self.right[columns], assume_a="pos") * self.scales[columns]
+        # `solve` would warn of a matrix that is nearly singular, as it is where the runs do not tell parameters apart.
+        factor = scipy.linalg.cho_factor(matrix)
+        mean = scipy.linalg.cho_solve(factor, self.right[columns]) * self.scales[columns]
         values = {self.names[column]: float(one) for column, one in zip(columns, mean, strict=True)}
         own = set(self.unknowns)
         return Estimate(

@@ -23,6 +23,7 @@ from smajax.attribution.joint_search import comparison_settings, fits_by_program
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model, independent_error
 from smajax.attribution.leave_one_run_out import predicting
 from smajax.attribution.model_fits import Model, Search
+from smajax.attribution.own_values import held_out_residuals
 from smajax.attribution.paired_errors import compared, pooled_rms
 from smajax.attribution.score_test import Score, ranked
 from smajax.attribution.unknown.ranges import Sought, sought
@@ -59,7 +60,8 @@ def with_terms(setting: Search, final: Model) -> tuple[Search, np.ndarray, Sough
     own = [name for name in parameters(whole) if name.split(".")[0] in names]
     known = {name: Prior(0.0, setting.config.term_prior_sigma, False) for name in own}
     known |= setting.prior_records(presets=False)
-    problem = plain.with_system(whole, priors=known)
+    own_values = dataclasses.replace(plain.per_run, start=plain.per_run_at(jnp.asarray(final.values[index])))
+    problem = plain.with_system(whole, per_run=own_values, priors=known)
     bounds = {**setting.bounds, **dict.fromkeys(own, (-1.0, 1.0))}
     unknowns = tuple(setting.free(final.effects))
     search = Search(
@@ -73,6 +75,7 @@ def with_terms(setting: Search, final: Model) -> tuple[Search, np.ndarray, Sough
         setting.held_out,
         config=setting.config,
         of_unknowns=setting.of_unknowns,
+        held_out_runs=setting.held_out_runs,
     )
     return search, problem.start_values(), found
 
@@ -183,7 +186,8 @@ def learnt(setting: Search, fits: TermFits) -> Lacking:
     enough = log_odds[0] > 0.0 and several and predict[likeliest.effects[-1]] < present.left_out_rmse
     held_out = None
     if enough and search.held_out is not None:
-        without, with_it = search.held_out_residuals(search.candidates, [present.values, likeliest.values])
+        both = [present.values, likeliest.values]
+        without, with_it = held_out_residuals(search, search.candidates, both)
         held_out = pooled_rms(without), pooled_rms(with_it)
         enough = compared(with_it, without, setting.config) != "worse"
     terms: list[UnknownTerm] = []

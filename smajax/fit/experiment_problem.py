@@ -23,17 +23,22 @@ def free_by_name(experiment: Experiment, runs: Sequence[Run]) -> dict[str, Unkno
     return {**shared, **per_run}
 
 
+def own_values(experiment: Experiment, runs: Sequence[Run]) -> PerRun:
+    """The unknowns with one value for each of `runs`, at their start."""
+    per_run = [unknown for unknown in experiment.unknowns if unknown.per_run]
+    start = jnp.asarray(np.tile([unknown.start for unknown in per_run], (len(runs), 1)), dtype=float)
+    return PerRun(tuple(unknown.name for unknown in per_run), tuple(run.name for run in runs), start)
+
+
 def declared_problem(experiment: Experiment, runs: Sequence[Run]) -> Problem:
     """The base model, and `runs` as they were measured."""
     model = base_model(experiment)
-    per_run = [unknown for unknown in experiment.unknowns if unknown.per_run]
-    start = jnp.asarray(np.tile([unknown.start for unknown in per_run], (len(runs), 1)), dtype=float)
     sigmas = jnp.asarray([output.noise_sigma for output in experiment.outputs])
     return Problem.build(
         model,
         pack(runs, experiment.step, parameter_values(model)),
         sigmas if len(sigmas) > 1 else sigmas[0],
         tuple(output.offset for output in experiment.outputs),
-        PerRun(tuple(unknown.name for unknown in per_run), tuple(run.name for run in runs), start),
+        own_values(experiment, runs),
         {name: one.prior for name, one in free_by_name(experiment, runs).items() if one.prior is not None},
     )

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.data.experiment.record import RUN_STARTS
 from smajax.data.model_file.actuator_model import ActuatorModel
 from smajax.data.model_file.of_experiment import actuator_model, range_of, rounded
 from smajax.data.model_file.record import LikelyModel, ModelOutput
+from smajax.data.model_file.values_of_runs import OfRuns
 from smajax.fit.identify_result import IdentifiedRun
 from smajax.fit.identify_stages import Fitted, Setup, Statistics
 from smajax.fit.packed_runs import simulate_batch, states_by_run
@@ -26,23 +26,12 @@ def identified_model(
     """
     experiment = setup.experiment
     shared = {name: value for name, value in fitted.values.items() if "[" not in name}
-    of_runs: dict[str, list[float]] = {}
-    for name, value in fitted.values.items():
-        if "[" in name:
-            own = name.split("[")[0]
-            of_runs.setdefault(RUN_STARTS.get(own, own), []).append(value)
-    means = {name: float(np.mean(values)) for name, values in of_runs.items() if name}
-    # Another run has another value: what they scatter by is the error of the mean as a prediction of it.
-    scatter = {name: float(np.var(of_runs[name], ddof=1)) for name in means if len(of_runs[name]) > 1}
-    keep = [k for k, name in enumerate(statistics.correlated) if name in shared]
-    names = (*(statistics.correlated[k] for k in keep), *scatter)
-    covariance = np.zeros((len(names), len(names)))
-    covariance[: len(keep), : len(keep)] = statistics.covariance[np.ix_(keep, keep)]
-    covariance[range(len(keep), len(names)), range(len(keep), len(names))] = list(scatter.values())
+    of_runs = OfRuns.among(fitted.values)
+    names, covariance = of_runs.beside(statistics.correlated, statistics.covariance)
     likely = LikelyModel(
         experiment.declared_effects,
         1.0,
-        {**shared, **means},
+        {**shared, **of_runs.means},
         names,
         covariance,
         {name: one.prior for name, one in setup.unknowns.items() if name in shared and one.prior is not None},
@@ -55,7 +44,10 @@ def identified_model(
         experiment,
         [likely],
         {name.split("[")[0]: one for name, one in setup.bounds.items()},
-        {**statistics.uncertainty.standard_error, **{name: variance**0.5 for name, variance in scatter.items()}},
+        {
+            **statistics.uncertainty.standard_error,
+            **{name: variance**0.5 for name, variance in of_runs.scatter.items()},
+        },
         _outputs(setup, fitted, runs),
         ranges,
     )

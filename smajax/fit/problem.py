@@ -97,8 +97,9 @@ class Problem(eqx.Module):
         per_run: PerRun | None = None,
         priors: Mapping[str, Prior] = MappingProxyType({}),
     ) -> Problem:
-        """The same outputs, their noise and zeros, by another model. `batch`: of other runs than these."""
-        whole = Problem.build(system, batch or self.batch, self.noise_sigma, self.offset, per_run, priors)
+        """The same outputs, their noise and zeros, by another model; `batch`: of other runs, which have no values of their own but `per_run`."""
+        own = self.per_run if batch is None and per_run is None else per_run
+        whole = Problem.build(system, batch or self.batch, self.noise_sigma, self.offset, own, priors)
         return dataclasses.replace(whole, scale=self.scale)
 
     def in_first_noises(self) -> Problem:
@@ -181,6 +182,14 @@ class Problem(eqx.Module):
     def per_run_at(self, values: Float[Array, " parameter"]) -> Float[Array, "run parameter"]:
         """The values of each run."""
         return values[len(self.shared) :].reshape(self.per_run.start.shape)
+
+    def with_own_values(self, values: np.ndarray) -> RunBatch:
+        """The runs with their own values at `values` (P,), where a simulation of the model alone finds them."""
+        names = self.per_run.names
+        if not names:
+            return self.batch
+        overrides = jnp.concatenate([self.batch.overrides, self.per_run_at(jnp.asarray(values))], axis=1)
+        return dataclasses.replace(self.batch, overrides=overrides, override_names=(*self.batch.override_names, *names))
 
     def predict(self, values: Float[Array, " parameter"]) -> Float[Array, "series time"]:
         """Sensor outputs of the simulated runs."""

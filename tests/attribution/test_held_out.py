@@ -11,6 +11,7 @@ import pytest
 from smajax.attribution import held_out
 from smajax.attribution.config import AttributionConfig
 from smajax.attribution.held_out import validated
+from smajax.attribution.run_finding import RunFinding
 
 LEFT = np.random.default_rng(1).normal(size=400)
 OWN = {letters: np.random.default_rng(ord(letters[-1])).normal(size=400) for letters in ("a", "b", "ab")}
@@ -26,9 +27,21 @@ def _models(monkeypatch: pytest.MonkeyPatch, errors: dict[str, float]) -> tuple[
 
     def compare(job: object, setting: object, first: object, final: Any) -> tuple[Any, None, None]:
         values = {"measured": np.zeros(400), "before": -residual(""), "after": -residual("".join(final.effects))}
-        rms = {f"rmse_{which}": float(np.sqrt(np.mean(values[which] ** 2))) for which in ("before", "after")}
-        zero = {"offset_before": 0.0, "offset_after": 0.0}
-        run = RunFinding(name="held", role="held-out", time=np.arange(400), inputs={}, states={}, **values, **rms, **zero)
+        before, after = (float(np.sqrt(np.mean(values[which] ** 2))) for which in ("before", "after"))
+        run = RunFinding(
+            name="held",
+            role="held-out",
+            time=np.arange(400),
+            inputs={},
+            measured=values["measured"],
+            before=values["before"],
+            after=values["after"],
+            states={},
+            offset_before=0.0,
+            offset_after=0.0,
+            rmse_before=before,
+            rmse_after=after,
+        )
         return (run,), None, None
 
     def model(effects: str) -> Any:

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 import smajax as sma
-from smajax.attribution.refusal import refuse_keys_of_identify
 from smajax.data.experiment.draft import draft
 from smajax.data.experiment.draft_model import ModelChoice
 from smajax.data.experiment.first_force import first_force
@@ -61,7 +60,6 @@ def test_a_draft_of_a_drive_and_a_force_has_a_blocked_wire_and_the_pretension_of
     assert [one.parameters["pretension"] for one in experiment.runs] == pytest.approx([2.0, 3.0, 2.5], abs=0.5 * NOISE)
     assert experiment.runs[0].role == "fit"
     assert experiment.noise_sigma == pytest.approx(NOISE, rel=0.2)
-    refuse_keys_of_identify(experiment)
 
 
 def test_a_force_beside_a_position_is_taken_only_if_it_is_asked_for(tmp_path: Path) -> None:

@@ -10,7 +10,6 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from smajax.attribution.close_loop import close_loop
 from smajax.core.parameters import set_parameters
 from smajax.core.progress import Event, Progress, Stage, quiet
 from smajax.data.experiment.errors import ExperimentError
@@ -282,27 +281,6 @@ def test_a_killed_identification_resumes_to_the_same_result(tmp_path: Path) -> N
         _loaded(coupon_file(tmp_path, unknown_section() + BOTH, seed=6)), starts=4, memory=tmp_path / "fits"
     )
     assert "stages read from the cache" not in other.provenance
-
-
-@pytest.mark.parametrize(
-    ("more", "words"),
-    [
-        (unknown_section() + BOTH, r"channels: close-loop fits one output and got 2 \(also resistance\)"),
-        (unknown_section() + OHMS, r"channels.resistance: close-loop fits the load's own sensor, 'strain'"),
-        (
-            unknown_section(austenite_start=", per_run = true") + STRAIN,
-            r"unknown.austenite_start: close-loop knows no value of",
-        ),
-        (
-            unknown_section(austenite_start=', prior = { mean = "70 degC", sigma = "1 K" }') + STRAIN,
-            r"unknown.austenite_start.prior: close-loop takes no prior; `smajax identify` does",
-        ),
-    ],
-)
-def test_close_loop_refuses_keys_that_only_identify_uses(tmp_path: Path, more: str, words: str) -> None:
-    noise = "" if "noise" in more else 'noise = "estimate"\n'
-    with pytest.raises(ExperimentError, match=words):
-        close_loop(_loaded(coupon_file(tmp_path, more + noise)), memory=tmp_path / "fits")
 
 
 def test_sensors_and_starts_are_those_of_scipys_integration(tmp_path: Path) -> None:
