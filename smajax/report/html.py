@@ -11,7 +11,7 @@ from markupsafe import Markup
 
 from smajax.attribution.findings import Findings, ParameterFinding, Role, Verdict, coverage, pooled_rmse
 from smajax.core.display_units import chance, correlation, digits, display, label, p_value, with_error
-from smajax.core.wording import per_cent
+from smajax.core.wording import and_listed, per_cent
 from smajax.fit.uncertainty import RemarkKind
 from smajax.report import pictures, run_plots
 from smajax.report.embedded import picture
@@ -200,6 +200,11 @@ def _runs(findings: Findings) -> list[dict[str, Any]]:
     ]
 
 
+def _own_values(findings: Findings) -> list[str]:
+    """Parameters with a value of each run's own."""
+    return list(dict.fromkeys(one.name.split("[")[0] for one in findings.after if "[" in one.name))
+
+
 def _other_outputs(findings: Findings) -> list[dict[str, Any]]:
     """One row for each output beside the first, and run."""
     rows = []
@@ -297,6 +302,7 @@ def findings_to_html(findings: Findings, narrative: Narrative | None = None, ste
             single=pictures.nothing_added(findings),
             # Without offsets in the fit they are exactly zero.
             offsets=any(run.offset_before or run.offset_after for run in findings.runs),
+            own_values=and_listed([label(one) for one in _own_values(findings)]),
             averaged=findings.averaged and all(run.average is not None for run in findings.runs),
             held_out=any(run.role == "held-out" for run in findings.runs),
             added=findings.added,

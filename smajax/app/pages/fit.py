@@ -56,7 +56,6 @@ def page(project: Project) -> Mapping[str, Any]:
         "fitted": [run.name for run in (file.runs if file else []) if run.role == "fit"],
         "held": [run.name for run in (file.runs if file else []) if run.role != "fit"],
         "warnings": experiment.warnings if experiment else (),
-        "several_outputs": experiment is not None and len(experiment.outputs) > 1,
         "defaults": DEFAULTS,
         "existing": {one.folder for one in project.results},
         **watch(project, COMMANDS),
