@@ -202,7 +202,9 @@ def _runs(findings: Findings) -> list[dict[str, Any]]:
 
 def _own_values(findings: Findings) -> list[str]:
     """Parameters with a value of each run's own."""
-    return list(dict.fromkeys(one.name.split("[")[0] for one in findings.after if "[" in one.name))
+    runs = [f"[{run.name}]" for run in findings.runs]
+    own = (one.name.split("[")[0] for one in findings.after if any(one.name.endswith(run) for run in runs))
+    return list(dict.fromkeys(own))
 
 
 def _other_outputs(findings: Findings) -> list[dict[str, Any]]:
@@ -302,7 +304,7 @@ def findings_to_html(findings: Findings, narrative: Narrative | None = None, ste
             single=pictures.nothing_added(findings),
             # Without offsets in the fit they are exactly zero.
             offsets=any(run.offset_before or run.offset_after for run in findings.runs),
-            own_values=and_listed([label(one) for one in _own_values(findings)]),
+            own_values=and_listed(own) if (own := [label(one) for one in _own_values(findings)]) else "",
             averaged=findings.averaged and all(run.average is not None for run in findings.runs),
             held_out=any(run.role == "held-out" for run in findings.runs),
             added=findings.added,
