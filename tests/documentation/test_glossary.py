@@ -174,6 +174,7 @@ PLAIN = set(
         "ohm",
         "one",
         "only",
+        "other",
         "open",
         "out",
         "output",
