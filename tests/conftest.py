@@ -68,6 +68,7 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     hands_out = session.config.getoption("numprocesses", None) and not hasattr(session.config, "workerinput")
     if hands_out:
         return
+    keep_to_one_core(getattr(session.config, "workerinput", {}).get("workerid", ""))
     from smajax.core.runtime import prepare
     from smajax.engine import kernel
 
@@ -77,6 +78,14 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     # Tracing makes millions of small objects that live: the collector looked at them again and again, a tenth of the time. Now it
     # looks at new ones alone; to look at all those that lived once took seconds each time.
     gc.set_threshold(100_000, 500, 50)
+
+
+def keep_to_one_core(worker: str) -> None:
+    """A worker (`gw0`, ...) by itself fills a core. With threads for all of them each worker's wait for cores that others use, a third of the time."""
+    if not worker or not hasattr(os, "sched_setaffinity"):
+        return
+    cores = sorted(os.sched_getaffinity(0))
+    os.sched_setaffinity(0, {cores[int(worker.removeprefix("gw")) % len(cores)]})
 
 
 @pytest.fixture(scope="module")
