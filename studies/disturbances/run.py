@@ -1,4 +1,4 @@
-"""`python -m studies.disturbances`: all controllers, `results.json`, the pictures and the tables of `README.md` (some five minutes); with names these alone, printed.
+"""`python -m studies.disturbances`: all controllers, `results.json`, the pictures and the tables of `README.md` (some three minutes); with names these alone, printed.
 
 `--fast`: the nominal plant alone, printed.
 """
@@ -27,6 +27,7 @@ from studies.requirement.run import gains_of
 
 HERE = Path(__file__).parent
 DRAWN_EVERY = 20  # samples
+COLUMNS = 3
 SEEN = 10.0  # degrees to either side of the set point that is held
 FIGURES = ("peak_deg", "recovery_s", "steady_error_deg")
 
@@ -68,13 +69,13 @@ def _shown(value: float | None, digits: int) -> str:
 
 
 def draw(figure: Figure, scenario: Scenario, angles: dict[str, np.ndarray]) -> None:
-    """A panel a controller: the angle of every plant, the nominal one dark, and the set point."""
+    """A panel a controller: the angle of every plant, the nominal one dark, and the set point. The lowest panel of each column has the times below it."""
     time = STEP * np.arange(len(scenario.wanted))[::DRAWN_EVERY]
-    rows = -(-len(angles) // 3)
-    axes_of = panels(figure, rows, 3, share=True)
+    rows = -(-len(angles) // COLUMNS)
+    axes_of = panels(figure, rows, COLUMNS, share=True)
     for spare in axes_of[len(angles) :]:
         spare.axis("off")
-    for axes, (name, several) in zip(axes_of, angles.items(), strict=False):
+    for number, (axes, (name, several)) in enumerate(zip(axes_of, angles.items(), strict=False)):
         axes.plot(time, scenario.wanted[::DRAWN_EVERY], color="#c8553d", linewidth=0.9, linestyle="--")
         for one in several[:0:-1]:
             axes.plot(time, one, color="#1f6fb2", linewidth=0.7, alpha=0.35)
@@ -82,7 +83,10 @@ def draw(figure: Figure, scenario: Scenario, angles: dict[str, np.ndarray]) -> N
         # Of a disturbance what follows it, at a scale on which it is seen; who does not hold the set point leaves the panel.
         low, high = (HELD - SEEN, HELD + SEEN) if scenario.unit else (-50.0, 100.0)
         axes.set(ylim=(low, high), xlim=(scenario.events[0] - 2.0, SECONDS))
-        named(axes, "time (s)", "angle (°)", name)
+        lowest = number + COLUMNS >= len(angles)
+        # Axes that are shared have the numbers in the last row alone, which is empty in some columns.
+        axes.tick_params(labelbottom=lowest)
+        named(axes, "time (s)" if lowest else "", "angle (°)", name)
 
 
 def main(arguments: list[str]) -> None:
