@@ -1,4 +1,4 @@
-"""`python -m studies.sweep.run`: the sweeps of this folder (some ten minutes; `--fast`: few plants, printed and not stored).
+"""`python -m studies.sweep.run`: the sweeps of this folder (some fifteen minutes; `--fast`: few plants, printed and not stored).
 
 Every controller with the gains of `studies.requirement`, where it has some, on the filter `adaptive` with 0.1 deg of noise, readings in steps of 0.1 deg and
 commands 10 ms late. `--true-state`: without all of these, printed and not stored. `--cache FOLDER`: finished controllers are read from there.

@@ -20,7 +20,6 @@ from studies.sweep.table import HERE, MARK, OTHERS, OTHERS_MARK, others_table, r
 
 RECORDS = {folder: record_of(folder) for folder in SWEEPS}
 RECORD = RECORDS["."]
-SWEPT = set(CONTROLLERS) - {"receding_horizon"}  # which came after these sweeps; their page says so
 
 
 def _infinite(values: list[float | None]) -> np.ndarray:
@@ -31,13 +30,31 @@ def test_the_tables_are_of_the_stored_numbers() -> None:
     page = (HERE / "README.md").read_text(encoding="utf-8")
     assert page.split(MARK)[1].strip() == table(RECORD)
     assert page.split(OTHERS_MARK)[1].strip() == others_table({folder: RECORDS[folder] for folder in OTHERS})
-    assert set(RECORD["least_times"]) == SWEPT > set(OF_THE_SOURCE)
+    assert set(RECORD["least_times"]) == set(CONTROLLERS) > set(OF_THE_SOURCE)
+
+
+def test_what_the_page_says_of_the_controllers_is_what_is_stored() -> None:
+    found = {
+        folder: {name: one["all_controllers"] for name, one in record["sweep"]["settling_over_least_time"].items()}
+        for folder, record in RECORDS.items()
+    }
+    first = sorted(found["."], key=lambda name: -found["."][name]["settled"])[:3]
+    assert first == ["receding_horizon", "backstepping1_integral", "pid"]
+    assert [found["."][name]["settled"] for name in first] == [1919, 1907, 1895]
+    assert {one["unreachable"] for one in found["."].values()} == {105}
+    assert min(found["."], key=lambda name: found["."][name]["median"]) == "backstepping1_integral"
+    never = {name: one["never"] for name, one in found["near"].items()}
+    assert (list(never.values()).count(0), never["sld"], sorted(never.values())[7] > 2) == (6, 2, True)
+    settled = {name for name, one in found["inertia"].items() if one["never"] == 0}
+    assert settled == {"pid", "vsc3", "feedforward_pi"}
+    horizon = RECORDS["inertia"]["sweep"]["maps"]["receding_horizon"]
+    assert found["inertia"]["receding_horizon"]["never"] == 9
+    assert {row.index(None) for row in horizon["settling_time"]["worst"] if None in row} == {14}  # +20 K
 
 
 @pytest.mark.parametrize("folder", SWEEPS)
 def test_the_loops_are_on_the_filter_with_noise_steps_and_delay_at_the_ratios_that_are_said(folder: str) -> None:
     record, settings = RECORDS[folder], settings_of(folder)
-    settings = dataclasses.replace(settings, tuned=tuple(one for one in settings.tuned if one.controller in SWEPT))
     assert record["between"] == settings.between
     assert "1 period late and are told their states from the filter `adaptive`" in record["between"]
     assert "0.1° of noise in steps of 0.1°" in record["between"]
@@ -52,7 +69,7 @@ def test_each_picture_draws_the_numbers_of_the_record(folder: str) -> None:
     """The digest in the file is that of the record, and that one is of the record's own numbers."""
     digests: dict[str, str] = RECORDS[folder]["pictures"]
     there = {path.name for path in (HERE / folder).glob("*.png")}
-    expected = set(digests) if folder == "." else {f"{name}_maps.png" for name in SWEPT}
+    expected = set(digests) if folder == "." else {f"{name}_maps.png" for name in CONTROLLERS}
     assert there == expected
     for name in there:
         with Image.open(HERE / folder / name) as picture:
