@@ -26,9 +26,8 @@ from smajax.simulation.batch.axes import zipped
 from smajax.simulation.batch.chunks import chunks
 from studies.disturbances.scenarios import CHANNELS, STEP, Scenario
 from studies.requirement.run import gains_of
-from studies.requirement.search import DELAY, FILTER, NOISE, PERIOD, VARIATION
+from studies.requirement.search import DELAY, FILTER, NOISE, PERIOD, QUANTUM, VARIATION
 
-QUANTUM = 0.1  # degrees, between two values of the reading
 SEED = 0
 MOST_PLANTS = 100
 SCENARIO, NUMBER = "scenario", "number"

@@ -32,6 +32,7 @@ from studies.requirement.search import (
     LOW,
     NOISE,
     PERIOD,
+    QUANTUM,
     VARIATION,
     box_of,
     drawn,
@@ -208,7 +209,7 @@ def main(arguments: list[str]) -> None:
         _judge_afresh(named, int(arguments[arguments.index("--fresh") + 1]))
         return
     rows, system = judged_on(), arm()
-    between, nominal = (interface_of(system, one, NOISE, PERIOD, STEP, DELAY) for one in (FILTER, NOMINAL))
+    between, nominal = (interface_of(system, one, NOISE, PERIOD, STEP, DELAY, QUANTUM) for one in (FILTER, NOMINAL))
     results = json.loads((HERE / "results.json").read_text(encoding="utf-8")) if named else {}
     for name in named or CONTROLLERS:
         gains, origin = gains_of(name)
@@ -232,7 +233,7 @@ def main(arguments: list[str]) -> None:
 
 def _judge_afresh(names: list[str], seed: int) -> None:
     """Print what the gains do on `FRESH` other plants, drawn with `seed`; nothing is written."""
-    rows, between = drawn(FRESH, seed), interface_of(arm(), FILTER, NOISE, PERIOD, STEP, DELAY)
+    rows, between = drawn(FRESH, seed), interface_of(arm(), FILTER, NOISE, PERIOD, STEP, DELAY, QUANTUM)
     for name in names or CONTROLLERS:
         one = judged(name, between, rows, gains_of(name)[0])
         print(f"{name}: {_met(one)} of {one['loops']} loops, beyond the limits {one['beyond']}", flush=True)

@@ -27,6 +27,7 @@ LIMITS = {"settling_time": 4.0, "overshoot": 2.0, "steady_error": 0.5}
 MARGIN = 0.95
 VARIATION = {"inertia": 0.2, "damping": 0.2, "convection": 0.2}
 FILTER, NOISE, PERIOD, DELAY = "adaptive", 0.1, 0.01, 1  # degrees, s, periods
+QUANTUM = 0.1  # degrees, between two values of the reading, of the loops that judge: gains were searched without
 SET_POINTS = (-40.0, -15.0, 10.0, 35.0, 60.0, 85.0)
 LOW, HIGH = -40.0, 85.0  # degrees
 FULL = 10.0  # V

@@ -80,7 +80,7 @@ class FeedforwardPi(AbstractController):
 def feedforward_pi(system: System) -> FeedforwardPi:
     """Gains of the arm, searched on the filter `model` with noise and delay.
 
-    Those of studies/requirement/gains/feedforward_pi.json, with `braking`, are slower and meet its limits in every loop.
+    Those of studies/requirement/gains/feedforward_pi.json, with `braking`, are slower and meet its limits in all of its loops but one.
     """
     return FeedforwardPi(
         hysteresis=hysteresis_of(system),
