@@ -13,7 +13,7 @@ discrepancy, and how well the bench repeats itself.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +23,7 @@ from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.likely_models_check import checked
 from smajax.attribution.model_fits import Model, Search
-from smajax.attribution.own_values import on_runs
+from smajax.attribution.own_values import on_runs, with_other_runs
 from smajax.fit.packed_runs import RunBatch
 from smajax.fit.prediction_band import BAND, averaged_band, reading_of
 
@@ -59,12 +59,11 @@ def averaged(
     final: Model,
     batch: RunBatch,
     base: Model | None = None,
-    samples: Sequence[int] | None = None,
-    runs: Sequence[str] = (),
+    samples: Mapping[str, int] | None = None,
 ) -> Averaged:
     """Every run of `batch`, held-out ones included, by the average of the likely models.
 
-    `samples` of each run on the clock; None: as many as are measured. `runs`: their names, where runs have values of their own.
+    `samples` of each run on the clock, by its name; None: as many as are measured, of runs without values of their own.
 
     With the `base` model those that carry weight are checked as the final model was (`likely_models_check`).
     """
@@ -75,18 +74,19 @@ def averaged(
     own = search.joint.ordered(final.effects)
     effects = [effect for model, _ in models for effect in model.effects]
     each = [(final if model.effects == own else model).values for model, _ in models]
-    problem, points = on_runs(setting, effects, each, batch, runs)
+    problem, points = on_runs(setting, effects, each, batch, list(samples or ()))
     readings, variances = [], []
     for (model, _), values in zip(models, points, strict=True):
-        covariance = model.covariance(search.error(model) ** 2)
-        found = reading_of(problem, values, model.names, model.scales, covariance)
+        error = search.error(model)
+        posterior = model.names, model.scales, model.covariance(error**2)
+        found = reading_of(problem, values, *with_other_runs(setting, problem, values, posterior, error))
         readings.append(found.reading)
         variances.append(found.variance)
     weights = np.asarray([weight for _, weight in models])
     missed = np.tile(prediction_errors(setting, final), batch.runs)[:, None]
     mean, half = averaged_band(np.stack(readings), np.stack(variances), weights, missed)
     mask = np.asarray(batch.mask) > 0
-    counts = mask.sum(axis=1) if samples is None else np.asarray(samples)[problem.owner]
+    counts = mask.sum(axis=1) if samples is None else np.asarray(list(samples.values()))[problem.owner]
     return Averaged(
         tuple(AveragedModel(model.effects, weight) for model, weight in models),
         tuple(_run(*one) for one in zip(problem.measured, mean, half, mask, counts.tolist(), strict=True)),

@@ -137,8 +137,7 @@ def close_loop(  # keywords, which a caller names one by one
     if interim is not None and not context.setting.is_noise(outcome.final):
         interim(known_so_far(context, (outcome.search, outcome.base, outcome.final), Remaining.CHECKS))
     outcome, rejected = against_the_held_out_runs(context, outcome)
-    outcome = against_an_unknown_term(context, outcome)
-    outcome = against_an_outlier_run(context, outcome)
+    outcome = against_an_outlier_run(context, against_an_unknown_term(context, outcome))
     compared = compare(context.job, context.setting, outcome.base, outcome.final)
     found = findings_of(context, outcome, compared, rejected)
     provenance = _provenance(experiment, cache, command, seed, clock.monotonic() - began)
@@ -165,6 +164,7 @@ def prepared(  # the stage's inputs, each once
         cache=cache,
         progress=progress,
         noise_given=all(output.noise_given for output in experiment.outputs),
+        noises_given=tuple(output.noise_given for output in experiment.outputs),
         held_out=job.held_out,
         held_out_runs=tuple(run.name for run in experiment.runs if run.role != "fit"),
         config=config,
@@ -253,9 +253,12 @@ def against_the_held_out_runs(context: Context, outcome: Outcome) -> tuple[Outco
 
 
 def against_an_unknown_term(context: Context, outcome: Outcome) -> Outcome:
-    """Evidence, where more than noise is left: one unknown function, or nothing at all, in the place of the effects."""
+    """Evidence, where more than noise is left or many effects were added: one unknown function, or nothing at all, in their place.
+
+    One effect that the library does not have may take several that it has, and together these may come down to the noise.
+    """
     setting, base, final = context.setting, outcome.base, outcome.final
-    if not final.effects or setting.is_noise(final):
+    if not final.effects or (setting.is_noise(final) and len(final.effects) < setting.config.many_effects):
         return outcome
     lacking = in_place_of(setting, base, final)
     if lacking is not None:
@@ -326,9 +329,8 @@ def findings_of(
     effects = effects_found(job, setting, final, after, scored=not brief)
     average = Averaged()
     if len(job.fit_runs) > 1 and not brief:  # else none can be left out, which the band is made of
-        samples = [len(run.time) for run in experiment.runs]
-        names = [run.name for run in experiment.runs]
-        average = averaged(setting, outcome.search, final, every_run(job), base, samples, names)
+        clocks = {run.name: len(run.time) for run in experiment.runs}
+        average = averaged(setting, outcome.search, final, every_run(job), base, clocks)
         runs = with_averages(runs, average.runs)
     states = {run.name: run.states for run in runs}
     extended_model = base_model = saved_model(job, setting, outcome.search, final, after, average, states)

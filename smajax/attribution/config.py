@@ -59,6 +59,9 @@ class AttributionConfig:
     separating_weight: float = 0.01  # from which a run that separates the two is looked for
 
     # Unknown terms
+    many_effects: int = (
+        3  # from which one unknown function is asked for in their place, even where they leave only noise
+    )
     terms_refitted: int = 6  # about one an equation
     term_start_share: float = 0.5  # of the score test's estimate: where a refit starts
     term_start_limit: float = 0.8  # of the largest coefficient: a start stays off the bound

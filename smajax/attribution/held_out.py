@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import jax.numpy as jnp
 import numpy as np
 
+from smajax.attribution.config import AttributionConfig
 from smajax.attribution.findings import (
     HeldOutWorse,
     OutputFinding,
     Rejected,
     ResidualDiagnostics,
     RunFinding,
-    pooled_rmse,
 )
 from smajax.attribution.job import Job
 from smajax.attribution.joint_search import JointSearch
@@ -23,8 +23,8 @@ from smajax.attribution.joint_stage import final_model, without
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.own_values import on_runs
-from smajax.attribution.paired_errors import Comparison, runs_compared
-from smajax.attribution.residual_diagnostics import diagnosed
+from smajax.attribution.paired_errors import Comparison, pooled_rms, runs_compared
+from smajax.attribution.residual_diagnostics import all_noise, diagnosed
 from smajax.core.parameters import parameter_values
 from smajax.data.experiment.record import Experiment, Output, Run
 from smajax.fit.integration import unlimited
@@ -55,7 +55,10 @@ def validated(
     gone = tuple(name for name in final.effects if name not in left.effects)
     if not gone:
         return left, compared, None
-    without_them, with_them = (pooled_rmse(one[0], "held-out", "after") for one in (compared, whole))
+    without_them, with_them = (
+        pooled_rms([left for run in one[0] if run.role == "held-out" for left in run.residuals("after")])
+        for one in (compared, whole)
+    )
     setting.set_aside(final, HeldOutWorse(without_them, with_them), gone)
     return left, compared, Rejected(gone, without_them, with_them)
 
@@ -105,6 +108,7 @@ def compare(job: Job, setting: Search, first: Model, final: Model | FittedModel)
     runs = []
     residuals: dict[str, list[np.ndarray]] = {"before": [], "after": []}
     states: dict[str, list[dict[str, np.ndarray]]] = {"before": [], "after": []}
+    outputs: dict[str, list[str]] = {"before": [], "after": []}  # of each residual
     count = len(experiment.outputs)
     for index, run in enumerate(experiment.runs):
         readings = {which: one[index * count : (index + 1) * count] for which, (_, one) in simulated.items()}
@@ -114,16 +118,33 @@ def compare(job: Job, setting: Search, first: Model, final: Model | FittedModel)
             for which in states:
                 series = _series(run, shown[which][run.name])
                 residuals[which] += found.residuals("before" if which == "before" else "after")
-                measured = [np.isfinite(one) for one in run.outputs.values()]
-                states[which] += [
-                    {name: values[there] for name, values in series.items()} for there in measured if there.any()
-                ]
+                for output, measured in run.outputs.items():
+                    there = np.isfinite(measured)
+                    if there.any():
+                        outputs[which].append(output)
+                        states[which].append({name: values[there] for name, values in series.items()})
     noise = experiment.noise_sigma, all(output.noise_given for output in experiment.outputs)
-    return (
-        tuple(runs),
-        diagnosed(residuals["before"], states["before"], *noise, setting.config),
-        diagnosed(residuals["after"], states["after"], *noise, setting.config),
+    before, after = (
+        replace(
+            diagnosed(residuals[which], states[which], *noise, setting.config),
+            noise_by_output=_noise_by_output(experiment, residuals[which], outputs[which], setting.config),
+        )
+        for which in ("before", "after")
     )
+    return tuple(runs), before, after
+
+
+def _noise_by_output(
+    experiment: Experiment, residuals: Sequence[np.ndarray], outputs: Sequence[str], config: AttributionConfig
+) -> dict[str, bool]:
+    """Of several outputs whether the residuals of each, in noises of the first, are noise."""
+    if len(experiment.outputs) == 1:
+        return {}
+    found = {}
+    for output in experiment.outputs:
+        own = [left for left, name in zip(residuals, outputs, strict=True) if name == output.name]
+        found[output.name] = not own or all_noise(own, experiment.noise_sigma, output.noise_given, config)
+    return found
 
 
 def _run_finding(

@@ -63,6 +63,8 @@ def left_out(joint: JointParameters, model: FittedModel, error: float, program: 
             points[part] = fit.values
     every = np.tile(model.values, (len(points), 1))
     every[:, index] = np.stack(points)
+    if any(part >= 0 for part in _own(problem, model.names, owner)):
+        found = misfits(problem, _with_own_values_fitted(joint, problem, model, points, parts))
     return LeftOut(np.stack([found[part, series] for series, part in enumerate(owner)]), every)
 
 
@@ -93,14 +95,7 @@ def _steps(
     slots = [problem.names.index(name) for name in model.names]
     low, high = np.asarray([joint.bounds[name] for name in model.names]).T
     # A run's own value stays: without the run nothing says what it is.
-    run_of = {
-        name: number
-        for number, run in enumerate(problem.per_run.runs)
-        for name in model.names
-        if name.endswith(f"[{run}]")
-    }
-    of_series = owner[:: len(problem.batch.outputs)]
-    own = np.asarray([of_series[run_of[name]] if name in run_of else -1 for name in model.names])
+    own = _own(problem, model.names, owner)
     points = []
     for part in range(owner.max() + 1):
         others = gram[owner != part].sum(axis=0) + precision
@@ -109,6 +104,33 @@ def _steps(
         point[slots] = np.clip(point[slots] + np.where(own == part, 0.0, step), low, high)
         points.append(point)
     return points
+
+
+def _own(problem: Problem, names: Sequence[str], owner: np.ndarray) -> np.ndarray:
+    """Of each of `names` the part of the runs whose own value it is, -1 of a shared one; `owner`: the part of each series."""
+    part = owner[:: len(problem.batch.outputs)]
+    run_of = {
+        name: part[k] for k, run in enumerate(problem.per_run.runs) for name in names if name.endswith(f"[{run}]")
+    }
+    return np.asarray([run_of.get(name, -1) for name in names], dtype=int)
+
+
+def _with_own_values_fitted(
+    joint: JointParameters, problem: Problem, model: FittedModel, points: Sequence[np.ndarray], parts: np.ndarray
+) -> list[np.ndarray]:
+    """`points` (P,) without each part of the runs, with the own values of its runs fitted to them, as of a run that is held out."""
+    own = _own(problem, model.names, parts[problem.owner])
+    tasks = [
+        problem.task(
+            [name for name, whose in zip(model.names, own, strict=True) if whose == part],
+            joint.bounds,
+            point,
+            (parts == part).astype(float),
+        )
+        for part, point in enumerate(points)
+    ]
+    fits = levenberg_marquardt(problem, tasks, FitSettings(max_steps=STEPS, tolerance=TOLERANCE))
+    return [fit.values for fit in fits]
 
 
 def _cost(misfit: np.ndarray, error: float, series: np.ndarray) -> float:

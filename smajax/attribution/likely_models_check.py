@@ -15,7 +15,7 @@ from smajax.attribution.findings import DroppedModel, HeldOutWorse, StepDependen
 from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
-from smajax.attribution.own_values import held_out_residuals
+from smajax.attribution.own_values import held_out_owners, held_out_residuals
 from smajax.attribution.paired_errors import compared, pooled_rms
 from smajax.attribution.step_size_check import gain_kept_at_half_step
 from smajax.model.effects.library import LIBRARY
@@ -57,13 +57,14 @@ def _on_held_out(
     simpler = [_without_one(search, one) for one in models]
     values = [base.values, *(one.values for one in models), *(one.values for one in simpler if one is not None)]
     every = [effect for one in models for effect in one.effects]
+    owners = held_out_owners(setting)
     basic, *others = held_out_residuals(setting, every, values)
     own, nested = others[: len(models)], iter(others[len(models) :])
     found = {}
     for one, rest, mine in zip(models, simpler, own, strict=True):
         without = basic if rest is None else next(nested)
         for other in (basic, without):
-            if compared(mine, other, setting.config) == "worse":
+            if compared(mine, other, setting.config, owners) == "worse":
                 found[one.effects] = HeldOutWorse(pooled_rms(other), pooled_rms(mine))
                 break
     return found

@@ -77,7 +77,8 @@ class Search:
     candidates: tuple[str, ...]
     cache: ResultCache
     progress: Progress = quiet
-    noise_given: bool = True  # by the experiment file; else estimated
+    noise_given: bool = True  # of every output by the experiment file; else estimated
+    noises_given: tuple[bool, ...] = ()  # of each output; none: as `noise_given`
     held_out: RunBatch | None = None  # which no fit sees, and which refuse an unknown term in the end
     held_out_runs: tuple[str, ...] = ()  # their names
     config: AttributionConfig = DEFAULT
@@ -223,8 +224,15 @@ class Search:
         return self.all_noise(misfit, np.asarray(problem.batch.mask))
 
     def all_noise(self, misfit: np.ndarray, mask: np.ndarray) -> bool:
-        """Whether a misfit (SI) is measurement noise, as far as `mask` goes, both (R, N)."""
-        return all_noise(split_runs(misfit, mask), float(self.problem.noise_sigma), self.noise_given, self.config)
+        """Whether a misfit is measurement noise in every output, as far as `mask` goes; both (series, N), of whole runs."""
+        return all(self.noise_by_output(misfit, mask))
+
+    def noise_by_output(self, misfit: np.ndarray, mask: np.ndarray) -> list[bool]:
+        """The same of each output by itself: what one leaves is not made up for by another that leaves less than its noise."""
+        count, sigma = len(self.problem.batch.outputs), float(self.problem.noise_sigma)
+        given = self.noises_given or (self.noise_given,) * count
+        series = [split_runs(misfit[k::count], mask[k::count]) for k in range(count)]
+        return [not own or all_noise(own, sigma, known, self.config) for own, known in zip(series, given, strict=True)]
 
     def rmse(self, misfit: np.ndarray) -> float:
         return float(np.sqrt((misfit**2).sum() / np.asarray(self.problem.batch.mask).sum()))
@@ -232,7 +240,7 @@ class Search:
     def explained_variance(self, left_out_rmse: float) -> float:
         """Share of the mean square of the motion in the fit runs, each about its mean, that a left-out error leaves explained."""
         mask = np.asarray(self.problem.batch.mask)
-        measured = np.asarray(self.problem.measured)
+        measured = self.problem.measured * self.problem.scale_of_series
         mean = (measured * mask).sum(axis=1, keepdims=True) / np.maximum(mask.sum(axis=1, keepdims=True), 1.0)
         motion = self.rmse((measured - mean) * mask)
         return 1.0 - (left_out_rmse / motion) ** 2 if motion > 0.0 else 1.0

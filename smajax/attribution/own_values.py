@@ -16,6 +16,7 @@ from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
 from smajax.fit.packed_runs import RunBatch
 from smajax.fit.predicted import misfits
 from smajax.fit.problem import PerRun, Problem
+from smajax.fit.sensitivity import sensitivity
 
 STAGE = "fitting the values of held-out runs"
 
@@ -49,6 +50,50 @@ def on_runs(
         fits = levenberg_marquardt(there, [there.task(free, bounds, point) for point in points], settings)
         points = [fit.values for fit in fits]
     return there, points
+
+
+def with_other_runs(
+    setting: Search,
+    problem: Problem,
+    values: np.ndarray,
+    posterior: tuple[Sequence[str], np.ndarray, np.ndarray],
+    error: float,
+) -> tuple[Sequence[str], np.ndarray, np.ndarray]:
+    r"""A posterior (names, their sizes, covariance over these) with the own values of runs that it does not have.
+
+    Those are fitted to their run whatever the others are, and so follow them: of the others' deviations $x$ they take $-G x$, with
+    $G = M^{-1} J_o^T J / s^2$ and $M = J_o^T J_o / s^2 + \Lambda$, and have $M^{-1}$ of their own. `error`: s, of an independent sample, in the unit
+    of the first output.
+    """
+    names, sizes, covariance = posterior
+    own = [name for name in problem.per_run.full_names if name not in names]
+    if not own:
+        return posterior
+    known = {name.split("[")[0]: one for name, one in setting.of_unknowns.items() if "[" in name}
+    ranges = {name.split("[")[0]: bounds for name, bounds in setting.bounds.items() if "[" in name}
+    widths = []
+    for name in own:
+        kind = name.split("[")[0]
+        at = float(values[problem.names.index(name)])
+        prior = known.get(kind)
+        low, high = ranges[kind]
+        widths.append(high - low if prior is None else prior.sigma * (at if prior.logarithmic else 1.0))
+    jacobian = sensitivity(problem, values, [*names, *own]).jacobian
+    columns = jacobian.reshape(-1, jacobian.shape[-1]) * np.concatenate([sizes, widths])
+    columns = columns * float(problem.noise_sigma) / error
+    shared, theirs = columns[:, : len(names)], columns[:, len(names) :]
+    inverse = np.linalg.inv(theirs.T @ theirs + np.eye(len(own)))
+    follows = inverse @ (theirs.T @ shared)
+    crossed = -covariance @ follows.T
+    whole = np.block([[covariance, crossed], [crossed.T, follows @ covariance @ follows.T + inverse]])
+    return [*names, *own], np.concatenate([sizes, widths]), whole
+
+
+def held_out_owners(setting: Search) -> list[int]:
+    """Of which held-out run each series of `held_out_residuals` is."""
+    assert setting.held_out is not None
+    measured = (np.asarray(setting.held_out.mask) > 0).any(axis=1)
+    return [k // len(setting.held_out.outputs) for k in np.flatnonzero(measured).tolist()]
 
 
 def held_out_residuals(setting: Search, effects: Sequence[str], values: Sequence[np.ndarray]) -> list[list[np.ndarray]]:

@@ -27,8 +27,15 @@ Comparison = Literal["better", "worse", "alike"]
 LEAST_FREEDOM = 2.0  # degrees of freedom of two runs: with one, Student's t asks for 14 standard errors
 
 
-def compared(new: Sequence[np.ndarray], old: Sequence[np.ndarray], config: AttributionConfig) -> Comparison:
+def compared(
+    new: Sequence[np.ndarray],
+    old: Sequence[np.ndarray],
+    config: AttributionConfig,
+    owners: Sequence[int] | None = None,
+) -> Comparison:
     """How `new` predicts beside `old`; both are residuals of each run (n,), of the same samples.
+
+    `owners`: of which run each is, where several are of one, as its outputs are; these go together.
 
     "alike" where the difference may be chance (`held_out_errors` standard errors of a normal distribution), or the root mean squares differ by
     no more than `held_out_tolerance`. A model without a number is worse than one with.
@@ -45,7 +52,7 @@ def compared(new: Sequence[np.ndarray], old: Sequence[np.ndarray], config: Attri
         return "alike"
     share = sum(float(mine @ change) for mine, change in zip(new, changes, strict=True)) / total
     scores = [(mine - share * change) * change for mine, change in zip(new, changes, strict=True)]
-    if abs(share - 0.5) <= _by_chance(scores, config.held_out_errors) / total:
+    if abs(share - 0.5) <= _by_chance(scores, config.held_out_errors, owners) / total:
         return "alike"
     return "worse" if share > 0.5 else "better"
 
@@ -54,11 +61,9 @@ def runs_compared(
     new: Sequence[RunFinding], old: Sequence[RunFinding], which: Literal["before", "after"], config: AttributionConfig
 ) -> Comparison:
     """How the extended model of `new` predicts these runs beside the model `which` of `old`, the same runs."""
-    return compared(
-        [one for run in new for one in run.residuals("after")],
-        [one for run in old for one in run.residuals(which)],
-        config,
-    )
+    mine, theirs = [run.residuals("after") for run in new], [run.residuals(which) for run in old]
+    owners = [number for number, series in enumerate(mine) for _ in series]
+    return compared([one for run in mine for one in run], [one for run in theirs for one in run], config, owners)
 
 
 def pooled_rms(runs: Sequence[np.ndarray]) -> float:
@@ -66,14 +71,19 @@ def pooled_rms(runs: Sequence[np.ndarray]) -> float:
     return float(np.sqrt(np.mean(np.concatenate(list(runs)) ** 2)))
 
 
-def _by_chance(scores: Sequence[np.ndarray], errors: float) -> float:
+def _by_chance(scores: Sequence[np.ndarray], errors: float, owners: Sequence[int] | None) -> float:
     """What the sum of the scores (n,) of runs may be off by: so many standard errors, were it normal."""
-    quantile = scipy.stats.norm.cdf(errors)
-    count, time = sum(map(len, scores)), correlation_time(scores)
-    within = np.sqrt(_squares(scores) * time) * scipy.stats.t.ppf(quantile, max(count / time - 1.0, 1.0))
-    if len(scores) == 1:
+    by_run: dict[int, list[np.ndarray]] = {}
+    for run, score in zip(range(len(scores)) if owners is None else owners, scores, strict=True):
+        by_run.setdefault(run, []).append(score)
+    quantile, time = scipy.stats.norm.cdf(errors), correlation_time(scores)
+    # Of one run the outputs go together as far as can be: their sizes add up, and they are no further samples.
+    count = sum(max(map(len, outputs)) for outputs in by_run.values())
+    sizes = np.asarray([sum(float(np.linalg.norm(one)) for one in outputs) for outputs in by_run.values()])
+    sums = np.asarray([sum(float(one.sum()) for one in outputs) for outputs in by_run.values()])
+    within = np.sqrt(float(sizes @ sizes) * time) * scipy.stats.t.ppf(quantile, max(count / time - 1.0, 1.0))
+    if len(sums) == 1:
         return float(within)
-    sums = np.asarray([float(score.sum()) for score in scores])
     between = np.sqrt(len(sums) / (len(sums) - 1) * float(sums @ sums))
     return float(max(within, between * scipy.stats.t.ppf(quantile, max(len(sums) - 1.0, LEAST_FREEDOM))))
 

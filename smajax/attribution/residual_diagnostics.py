@@ -28,7 +28,9 @@ def diagnosed(
 
 
 def noise_like(found: ResidualDiagnostics, config: AttributionConfig = DEFAULT) -> bool:
-    """Nothing left to explain: white, or no larger than the noise but for what its autocorrelation accounts for."""
+    """Nothing left to explain: white, or no larger than the noise but for what its autocorrelation accounts for; of every output."""
+    if found.noise_by_output:
+        return all(found.noise_by_output.values())
     return found.filter_coefficient > 0.0 or _is_noise(found.ratio, found.white, found.independent, config)
 
 

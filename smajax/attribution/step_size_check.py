@@ -39,8 +39,8 @@ def gain_kept_at_half_step(setting: Search, new: Model, old: Model) -> float:
         for effect in jumping:
             for name in setting.coefficients(effect):
                 values[setting.problem.names.index(name)] = base_value(name)
-        (fit,), _ = setting.fit([Start(partner, values)], "checking at half the step")
-        without = min(without, fit.cost)
+        _, (left,) = setting.fit([Start(partner, values)], "checking at half the step")
+        without = min(without, float(np.sum((left / np.asarray(setting.problem.noise)) ** 2)))
     problem, index = setting.restricted(new.effects)
     fine = problem.with_system(problem.system, _finer(problem.batch), problem.per_run)
     misfit = problem.centred(problem.measured - predicted_at(fine, [new.values[index]])[0][:, ::2])

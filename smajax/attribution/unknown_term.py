@@ -23,7 +23,7 @@ from smajax.attribution.joint_search import comparison_settings, fits_by_program
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model, independent_error
 from smajax.attribution.leave_one_run_out import predicting
 from smajax.attribution.model_fits import Model, Search
-from smajax.attribution.own_values import held_out_residuals
+from smajax.attribution.own_values import held_out_owners, held_out_residuals
 from smajax.attribution.paired_errors import compared, pooled_rms
 from smajax.attribution.score_test import Score, ranked
 from smajax.attribution.unknown.ranges import Sought, sought
@@ -54,7 +54,7 @@ def with_terms(setting: Search, final: Model) -> tuple[Search, np.ndarray, Sough
     """
     plain, index = setting.restricted(final.effects)
     system = plain.system_at(jnp.asarray(final.values[index]))
-    found = sought(system, plain.batch)
+    found = sought(system, plain.with_own_values(final.values[index]))
     names = tuple(term.effect_name for term in found.terms)
     whole = dataclasses.replace(system, effects=(*system.effects, *found.terms))
     own = [name for name in parameters(whole) if name.split(".")[0] in names]
@@ -72,6 +72,7 @@ def with_terms(setting: Search, final: Model) -> tuple[Search, np.ndarray, Sough
         setting.cache,
         setting.progress,
         setting.noise_given,
+        setting.noises_given,
         setting.held_out,
         config=setting.config,
         of_unknowns=setting.of_unknowns,
@@ -189,7 +190,7 @@ def learnt(setting: Search, fits: TermFits) -> Lacking:
         both = [present.values, likeliest.values]
         without, with_it = held_out_residuals(search, search.candidates, both)
         held_out = pooled_rms(without), pooled_rms(with_it)
-        enough = compared(with_it, without, setting.config) != "worse"
+        enough = compared(with_it, without, setting.config, held_out_owners(search)) != "worse"
     terms: list[UnknownTerm] = []
     for model, odds in zip(fitted, log_odds, strict=True):
         left_out = present.left_out_rmse, predict.get(model.effects[-1])

@@ -139,7 +139,8 @@ def _normal_equations(
         with np.errstate(
             over="ignore", invalid="ignore", divide="ignore"
         ):  # a step to where a load jumps: it will be rejected
-            misfit = np.sqrt(np.sum((residual / weight) ** 2, axis=1) / samples)  # nan of a run without weight
+            # nan of a run without weight
+            misfit = np.sqrt(np.sum((residual / weight) ** 2, axis=1) / samples) / problem.scale_of_series[:, 0]
             equations.append(((float(value @ value), rows @ value, rows @ rows.T), misfit))
     return equations
 

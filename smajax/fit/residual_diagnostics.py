@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -24,6 +24,8 @@ class ResidualDiagnostics:
     correlation: dict[str, float]  # with time, input, temperature, martensite_fraction, stress, rate
     # Of a first-order autoregressive noise, where the residual is taken as one that is larger than estimated; else 0.
     filter_coefficient: float = 0.0
+    # Of several outputs: whether what is left of each by itself is noise, by name.
+    noise_by_output: dict[str, bool] = field(default_factory=dict)
 
 
 def phase_of(fraction: np.ndarray, temperature: np.ndarray, ambient: float) -> np.ndarray:

@@ -166,7 +166,10 @@ def _unknown(term: UnknownTerm, why: str) -> dict[str, Any]:
 
 
 def _residual(result: ResidualDiagnostics, sentences: Sequence[str]) -> dict[str, Any]:
-    return {**dataclasses.asdict(result), "sentences": sentences}
+    record = dataclasses.asdict(result)
+    if not result.noise_by_output:  # of one output the verdict says it
+        del record["noise_by_output"]
+    return {**record, "sentences": sentences}
 
 
 def _round(entry: Round, why: str) -> dict[str, Any]:

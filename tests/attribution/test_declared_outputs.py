@@ -15,6 +15,9 @@ import pytest
 from smajax.attribution.close_loop import close_loop
 from smajax.attribution.findings import Findings, Verdict, pooled_rmse, pooled_rmse_of
 from smajax.attribution.job import job_of
+from smajax.attribution.model_fits import Search
+from smajax.attribution.run_extent import extent_of
+from smajax.core.result_cache import ResultCache
 from smajax.data.experiment.load import load_experiment
 from smajax.data.experiment.record import Experiment
 from smajax.data.model_catalogue import CATALOGUE
@@ -190,3 +193,53 @@ def test_nothing_is_missing_in_two_outputs_or_in_the_other_alone(tmp_path: Path,
     # The resistance does not show an expansion.
     assert found.verdict is Verdict.ADEQUATE
     assert found.output_name == (only or "strain")
+
+
+def test_of_two_outputs_the_order_changes_nothing(experiment: Experiment) -> None:
+    """What left-out errors explain is counted in noises of the first, whichever that is."""
+    flipped = dataclasses.replace(
+        experiment,
+        outputs=experiment.outputs[::-1],
+        runs=tuple(
+            dataclasses.replace(run, outputs=dict(reversed(list(run.outputs.items())))) for run in experiment.runs
+        ),
+    )
+    shares = []
+    for one in (experiment, flipped):
+        job = job_of(one)
+        setting = Search(job.problem, job.unknowns, job.bounds, job.candidates, ResultCache(None))
+        shares.append(setting.explained_variance(5.0 * one.noise_sigma))
+    assert shares[0] == pytest.approx(shares[1], rel=1e-9)
+    assert 0.5 < shares[0] < 1.0
+
+
+def test_an_output_that_leaves_less_than_its_noise_does_not_make_up_for_another(experiment: Experiment) -> None:
+    job = job_of(experiment)
+    setting = Search(job.problem, job.unknowns, job.bounds, job.candidates, ResultCache(None))
+    mask = np.asarray(job.problem.batch.mask)
+    slow = 1.4 * np.sqrt(2.0) * np.sin(np.arange(mask.shape[1]) / 20.0)
+    noise = np.random.default_rng(1).normal(0.0, 0.3, mask.shape)
+    misfit = np.where(np.arange(len(mask))[:, None] % 2 == 0, slow, noise) * experiment.noise_sigma * mask
+    assert setting.noise_by_output(misfit, mask) == [False, True]
+    assert not setting.all_noise(misfit, mask)
+
+
+def test_a_run_is_as_long_as_its_last_sample_of_any_output(experiment: Experiment) -> None:
+    whole = extent_of(job_of(experiment).problem).seconds
+    rare = [np.where(np.arange(len(run.time)) % 10 == 0, run.output, np.nan) for run in experiment.runs]
+    runs = tuple(
+        dataclasses.replace(run, outputs={**run.outputs, "strain": strains})
+        for run, strains in zip(experiment.runs, rare, strict=True)
+    )
+    assert extent_of(job_of(dataclasses.replace(experiment, runs=runs)).problem).seconds == whole
+    none = dataclasses.replace(runs[0], outputs={**runs[0].outputs, "strain": np.full(len(rare[0]), np.nan)})
+    assert extent_of(job_of(dataclasses.replace(experiment, runs=(none, *runs[1:]))).problem).seconds == whole
+
+
+def test_the_band_of_a_held_out_run_is_no_wider_for_its_own_value(found: Findings) -> None:
+    """Its own value follows the shared ones that it was fitted beside: on the first run and on the held-out one the band is as wide."""
+    widths = [float(np.median(run.average.half_width)) for run in found.runs if run.average is not None]
+    assert len(widths) == 3
+    assert widths[2] < 1.5 * max(widths[:2])
+    assert found.runs[2].average is not None
+    assert found.runs[2].average.coverage > 0.8

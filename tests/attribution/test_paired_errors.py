@@ -47,6 +47,23 @@ def test_of_two_models_that_are_as_good_one_is_rarely_called_worse(
 
 
 @pytest.mark.parametrize("runs", [1, 2, 3])
+def test_outputs_of_a_run_are_no_runs(runs: int) -> None:
+    """What a run has of its own is in all of its outputs."""
+    outputs = 3
+    owners = [run for run in range(runs) for _ in range(outputs)]
+    said = []
+    for seed in range(200):
+        random = np.random.default_rng([seed, 7])
+        new, old = (
+            [one + 0.2 * random.normal(size=N) for one in models for _ in range(outputs)]
+            for models in _as_good(seed, runs, 0.4 if runs > 1 else 0.0)
+        )
+        said.append(compared(new, old, CONFIG, owners))
+    assert said.count("worse") / 200 < 0.1
+    assert said.count("better") / 200 < 0.1
+
+
+@pytest.mark.parametrize("runs", [1, 2, 3])
 @pytest.mark.parametrize(("factor", "expected"), [(0.0, "better"), (2.0, "worse")])
 def test_what_takes_away_or_doubles_the_error_is_told(factor: float, expected: str, runs: int) -> None:
     random = np.random.default_rng(3)

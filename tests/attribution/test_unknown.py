@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 from functools import cache
+from importlib import import_module
+from types import SimpleNamespace
 from typing import ClassVar
 
 import jax
@@ -12,13 +14,15 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
+from smajax.attribution.close_loop import Outcome
+from smajax.attribution.config import AttributionConfig
 from smajax.attribution.findings import UnknownTerm, UnknownTermLikelier
 from smajax.attribution.formulas import formulas
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.unknown.ranges import Sought
 from smajax.attribution.unknown.spline import COUNT, design, spline
 from smajax.attribution.unknown.terms import UNKNOWN
-from smajax.attribution.unknown_term import in_place_of, unknown_terms, with_terms
+from smajax.attribution.unknown_term import Lacking, in_place_of, unknown_terms, with_terms
 from smajax.core.parameters import parameters
 from smajax.core.result_cache import ResultCache
 from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
@@ -38,6 +42,7 @@ from smajax.model.wire.heat import HeatState, HeatTerm
 from smajax.model.wire.wire import Wire
 from tests.helpers.often import often
 
+close_loop = import_module("smajax.attribution.close_loop")
 DT, SAMPLES, NOISE = 0.05, 180, 1e-4
 BOUNDS = {"convection_coefficient": (50.0, 400.0), "specific_heat": (100.0, 900.0), "recoverable_strain": (0.01, 0.1)}
 # Volts, held for 0.75 s each.
@@ -287,3 +292,18 @@ def test_formulas_are_found_for_small_and_narrow_functions(size: float, width: f
     found = formulas(0.3 * width, width, coefficients, 1e-4 * np.eye(COUNT), 100.0, "T")
     assert all(np.isfinite(one.curve).all() for one in found)
     assert bool(found) == (width > 0.0 and size > 0.0)
+
+
+@pytest.mark.parametrize(("noise", "effects", "asked"), [(True, "ab", False), (True, "abc", True), (False, "a", True)])
+def test_one_function_is_asked_for_in_the_place_of_many_effects_or_where_more_than_noise_is_left(
+    monkeypatch: pytest.MonkeyPatch, noise: bool, effects: str, asked: bool
+) -> None:
+    found = Lacking()
+    monkeypatch.setattr(close_loop, "in_place_of", lambda *_: found)
+    setting = SimpleNamespace(config=AttributionConfig(), is_noise=lambda _: noise)
+    base, final = (SimpleNamespace(effects=tuple(names)) for names in ("", effects))
+    outcome = Outcome(None, base, final)  # type: ignore[arg-type]
+    ended = close_loop.against_an_unknown_term(SimpleNamespace(setting=setting), outcome)
+    assert (ended.lacking is found) is asked
+    assert ended.superseded == (tuple(effects) if asked else ())
+    assert ended.final is (base if asked else final)

@@ -340,7 +340,7 @@ def _channels(inputs: _Inputs) -> _Section:
         if one.quantity and one.quantity not in {TIME, *roles}:
             role = "output" if one.quantity in sensors else "input"
             lines += [
-                f"# Not used by this model, or only by `smajax identify`: {one.name}",
+                f"# {'A further output, where it is of this wire' if role == 'output' else 'Not used by this model'}: {one.name}",
                 *_channel(one.quantity, role, one, inputs.is_variable(one.quantity), True),
                 "",
             ]

@@ -6,15 +6,24 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from smajax.attribution.findings import EffectFinding, Findings, RunFinding, Verdict, pooled_rmse
+from smajax.attribution.findings import (
+    EffectFinding,
+    Findings,
+    RunFinding,
+    Verdict,
+    other_outputs,
+    pooled_rmse,
+    pooled_rmse_of,
+)
 from smajax.attribution.paired_errors import Comparison, runs_compared
 from smajax.attribution.record_error import OutlierRun
-from smajax.core.display_units import digits
+from smajax.core.display_units import digits, label
 from smajax.core.wording import and_listed
 from smajax.report.identifiability_words import remark_text
 from smajax.report.narrative.values import assumed_text, error_text, far_text, value_text
 
 NAMED_SIZES = 4  # in a sentence
+UNLIKE = 2.0  # by which the noises that outputs leave differ and are more than noise
 NOTHING_MORE = (Verdict.ADEQUATE, Verdict.EXPLAINED)
 
 
@@ -93,7 +102,11 @@ def of_bounds(findings: Findings) -> Iterator[str]:
     """Coefficients of what was added, and parameters of the base model, that end at a bound."""
     added = tuple(f"{effect.name}." for effect in findings.added)
     limited = [one for one in findings.after if one.limited]
-    coefficients = [one.name for one in limited if one.name.startswith(added)]
+    of_effects = [one for one in limited if one.name.startswith(added)]
+    off = [one.name for one in of_effects if one.lower == 0.0 and one.value < 0.5 * one.upper]
+    if off:
+        yield f"Mind: {and_listed(off)} {'ends' if len(off) == 1 else 'end'} at zero, where the effect is off: the runs ask for none of it."
+    coefficients = [one.name for one in of_effects if one.name not in off]
     if coefficients:
         yield (
             f"Mind: {and_listed(coefficients)} {'ends' if len(coefficients) == 1 else 'end'} at a bound. The runs ask for more of the "
@@ -165,25 +178,54 @@ def of_a_size(findings: Findings, effect: EffectFinding) -> list[str]:
 
 
 def held_out_off(findings: Findings) -> list[RunFinding]:
-    """The held-out runs whose error is larger than the fit runs' beyond chance."""
+    """The held-out runs whose error in some output is larger than the fit runs' beyond chance."""
+    return list({run.name: run for run, *_ in _outputs_off(findings)}.values())
+
+
+def _outputs_off(findings: Findings) -> Iterator[tuple[RunFinding, str, str, float, float]]:
+    """(run, name and unit of the output, its error there, that of the fit runs) of each output that is off on a held-out run."""
     config = findings.config
-    level = max(pooled_rmse(findings.runs, "fit", "after"), findings.noise_sigma)
-    return [
-        run
-        for run in findings.runs
-        if run.role == "held-out"
-        and run.rmse_after > (config.held_out_ratio + config.held_out_chance / np.sqrt(2.0 * run.samples)) * level
-    ]
+    for run in findings.runs:
+        if run.role != "held-out":
+            continue
+        fitted = pooled_rmse(findings.runs, "fit", "after")
+        outputs = [
+            (findings.output_name, findings.output_unit, findings.noise_sigma, run.samples, run.rmse_after, fitted)
+        ]
+        for one in run.others:
+            fitted = pooled_rmse_of(findings.runs, one.name, "fit", "after")
+            outputs.append((one.name, one.unit, one.noise_sigma, one.samples, one.rmse_after, fitted))
+        for name, unit, noise, samples, error, fitted in outputs:
+            chance = config.held_out_ratio + config.held_out_chance / np.sqrt(2.0 * max(samples, 1))
+            if samples and error > chance * float(np.nanmax([fitted, noise])):
+                yield run, name, unit, error, fitted
 
 
 def held_out_warnings(findings: Findings) -> list[str]:
     """One sentence for each held-out run that the final model predicts clearly worse than it fits."""
     return [
-        f"{run.name}, which was held out, is off by {error_text(findings, run.rmse_after)}, "
-        f"{run.rmse_after / pooled_rmse(findings.runs, 'fit', 'after'):.1f} times the fit runs' error: the model misses what shows "
+        f"{run.name}, which was held out, is off by {value_text(error, unit, name)}"
+        + (f" ({label(name)})" if name != findings.output_name else "")
+        + f", {error / fitted:.1f} times the fit runs' error: the model misses what shows "
         "there and not in them, or something was different then (another day, another state of the wire)."
-        for run in held_out_off(findings)
+        for run, name, unit, error, fitted in _outputs_off(findings)
     ]
+
+
+def of_unlike_outputs(findings: Findings) -> Iterator[str]:
+    """Of several outputs, that one leaves far more noises than another: what is named is decided by one error for all."""
+    left = {findings.output_name: pooled_rmse(findings.runs, "fit", "after") / findings.noise_sigma}
+    for one in other_outputs(findings):
+        left[one.name] = pooled_rmse_of(findings.runs, one.name, "fit", "after") / one.noise_sigma
+    known = {name: ratio for name, ratio in left.items() if np.isfinite(ratio)}
+    if len(known) < 2:
+        return
+    most, least = max(known, key=lambda name: known[name]), min(known, key=lambda name: known[name])
+    if known[most] > max(UNLIKE, UNLIKE * known[least]):
+        yield (
+            f"Mind: on the fit runs the {label(most)} is off by {known[most]:.1f} times its noise and the {label(least)} by {known[least]:.1f}. One error for all outputs "
+            f"decides what is named, so that the {label(most)} may hide what the {label(least)} shows: look at it, and try without it."
+        )
 
 
 def held_out_comparison(findings: Findings) -> Comparison:

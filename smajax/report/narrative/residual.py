@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from smajax.attribution.findings import Findings, ResidualDiagnostics, Verdict
-from smajax.core.wording import times_noise
+from smajax.core.display_units import label
+from smajax.core.wording import and_listed, times_noise
 from smajax.report.narrative.caveats import held_out_warnings
 
 MENTIONED = 0.2  # size of a correlation from which it is worth a sentence
@@ -17,6 +18,11 @@ def residual_sentences(result: ResidualDiagnostics) -> tuple[str, ...]:
             f"is first-order autoregressive noise with coefficient {result.filter_coefficient:.2f}, and nothing beyond"
         )
     sentences = [f"The residual is {times_noise(result.ratio, 'the measurement noise')} and {memory}."]
+    more = [label(name) for name, noise in result.noise_by_output.items() if not noise]
+    if more:
+        sentences.append(
+            f"That is of all outputs together; by {'itself' if len(more) == 1 else 'themselves'} {and_listed(more)} {'leaves' if len(more) == 1 else 'leave'} more than noise."
+        )
     if result.white or result.filter_coefficient > 0.0:
         return tuple(sentences)
     phases = result.by_phase

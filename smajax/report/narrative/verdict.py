@@ -51,6 +51,7 @@ def summary(findings: Findings) -> tuple[str, ...]:
         sentences += [meaning, *caveats.of_a_size(findings, effect)]
     sentences += caveats.held_out_warnings(findings)
     sentences += caveats.of_a_faint_trace(findings)
+    sentences += caveats.of_unlike_outputs(findings)
     sentences += caveats.of_the_test(findings)
     sentences += caveats.of_effects_excluded(findings)
     first, *rest = sentences
