@@ -20,15 +20,16 @@ def assumed(job: Job, presets: Collection[str] = ()) -> tuple[AssumedParameter, 
     experiment, model = job.experiment, base_model(job.experiment)
     logged = {own for own, channel in REPLACED.items() if all(channel in run.inputs for run in experiment.runs)}
     unknown = {name.split("[")[0] for name in job.unknowns}
-    table = {name: entry for name, entry in parameters(model).items() if name not in {*unknown, *logged, *presets}}
+    own = set.intersection(*({*run.parameters} for run in experiment.runs))  # given with each run
+    known = {*unknown, *logged, *presets, *own}
+    table = {name: entry for name, entry in parameters(model).items() if name not in known}
     values = np.asarray(get_parameters(model, list(table))) if table else ()
-    own = set.intersection(*({*run.parameters} for run in experiment.runs))
     return tuple(
         AssumedParameter(
             name,
             entry.unit,
             float(value),
-            (name in WIRE_SIZES or entry.path[0] == "load") and name not in {*experiment.parameters, *own},
+            (name in WIRE_SIZES or entry.path[0] == "load") and name not in experiment.parameters,
         )
         for (name, entry), value in zip(table.items(), values, strict=True)
     )

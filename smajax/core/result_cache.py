@@ -35,7 +35,8 @@ class ResultCache:
 
     def __init__(self, folder: Path | None = None) -> None:
         self.folder = folder
-        self.reused = 0
+        self.reused = 0  # records of another run
+        self._own: set[str] = set()  # keys that this one has saved
         self._saved = -np.inf
 
     def key(self, work: Any, *settings: object) -> str:
@@ -51,7 +52,7 @@ class ResultCache:
         if path is None or not path.exists():
             return None
         record = arrays(path)
-        self.reused += record is not None
+        self.reused += record is not None and key not in self._own
         return record
 
     def save(self, key: str, record: Mapping[str, Any], *, last: bool = True) -> None:
@@ -63,6 +64,7 @@ class ResultCache:
         with writing(path) as file:
             np.savez(file, **record)
         self._saved = clock.monotonic()
+        self._own.add(key)
 
     def _path(self, key: str) -> Path | None:
         return None if self.folder is None else self.folder / f"{key}.npz"

@@ -42,6 +42,10 @@ def test_a_parameter_that_the_log_gives_is_not_assumed() -> None:
     names = {one.name for one in assumed(cast(Any, SimpleNamespace(experiment=experiment, unknowns=())))}
     assert "load_mass" not in names
     assert {"wire_length", "damping"} <= names
+    # Nor is one that every run has its own value of.
+    runs = tuple(dataclasses.replace(run, parameters={"ambient_temperature": 21.0}) for run in experiment.runs)
+    each = SimpleNamespace(experiment=dataclasses.replace(experiment, runs=runs), unknowns=())
+    assert names - {one.name for one in assumed(cast(Any, each))} == {"ambient_temperature"}
 
 
 def test_an_interval_over_runs_that_a_prior_narrows_is_not_given() -> None:

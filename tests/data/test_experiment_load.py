@@ -171,9 +171,10 @@ def test_a_fixed_unknown_is_a_known_value(bench: Path) -> None:
 
 
 def test_two_outputs_have_their_own_noise_and_offset(bench: Path) -> None:
-    warm = (
-        '[channels.temperature]\nrole = "output"\ncolumn = "pos"\nunit = "K"\nnoise = "0.5 K"\noffset = false\n[[runs]]'
-    )
+    for log in bench.glob("*.csv"):
+        head, *rows = log.read_text().splitlines()
+        log.write_text("\n".join([f"{head},kelvin", *(f"{row},{row.split(',')[-1]}" for row in rows)]))
+    warm = '[channels.temperature]\nrole = "output"\ncolumn = "kelvin"\nunit = "K"\nnoise = "0.5 K"\noffset = false\n[[runs]]'
     got = load(changed(bench, "[[runs]]", warm))
     position, temperature = got.outputs
     assert (position.name, position.offset, temperature.name, temperature.offset) == (

@@ -71,6 +71,11 @@ MISTAKES = [
         'column = "dutty"',
         r"runs.A.file: .*no column 'dutty'; did you mean 'duty'\? It has: time, duty, pos",
     ),
+    (
+        'column = "pos"',
+        'column = "duty"',
+        r"channels.position: is read from 'duty' in run 'A', as 'duty' is; give the column",
+    ),
     ('column = "time"', 'column = "posn"', r"runs.A.file: .*no column 'posn'; it has: time, duty, pos$"),
     ('column = "duty"', 'column = "tim"', r"runs.A.file: .*no column 'tim'; it has: time, duty, pos$"),
     ('unit = "mm"', 'unit = "mMeter"', r"channels.position.unit: unit 'mMeter' is not known; did you mean 'mm'\?"),
