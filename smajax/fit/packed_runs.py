@@ -69,7 +69,7 @@ def pack(runs: Sequence[Run], dt: float, defaults: dict[str, float], integration
         mask=jnp.asarray(
             [padded(np.isfinite(series).astype(float), "zero") for run in runs for series in run.outputs.values()]
         ),
-        overrides=jnp.asarray([[run.parameters.get(name, defaults[name]) for name in names] for run in runs]),
+        overrides=jnp.asarray([[{**defaults, **run.parameters}[name] for name in names] for run in runs]),
         override_names=names,
         dt=dt,
         outputs=tuple(runs[0].outputs),

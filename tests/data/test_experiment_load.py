@@ -187,6 +187,17 @@ def test_two_outputs_have_their_own_noise_and_offset(bench: Path) -> None:
     np.testing.assert_allclose(got.runs[0].outputs["temperature"], 1e3 * got.runs[0].output - 273.15, atol=1e-9)
 
 
+def test_the_temperature_that_a_run_starts_with_may_be_known(bench: Path) -> None:
+    first = 'file = "a.csv"\nparameters = { initial_temperature = "40 degC" }'
+    with pytest.raises(
+        ExperimentError, match=r"runs.B.parameters.initial_temperature: is missing, and other runs have"
+    ):
+        load(changed(bench, 'file = "a.csv"', first))
+    second = '[runs.parameters]\ninitial_temperature = "310 K"'
+    got = load(changed(bench, "[runs.parameters]", second))
+    assert [run.parameters["initial_temperature"] for run in got.runs] == pytest.approx([40.0, 36.85])
+
+
 def test_a_start_that_the_model_prescribes_is_refused(tmp_path: Path) -> None:
     np.savetxt(tmp_path / "50.txt", np.stack([300.0 + np.arange(30.0), np.linspace(4.0, 0.0, 30) ** 2], axis=1))
     start = 'initial_temperature = { low = "0 degC", high = "50 degC", start = "20 degC" }'

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -293,8 +294,17 @@ def test_sensors_and_starts_are_those_of_scipys_integration(tmp_path: Path) -> N
     values = problem.start_values()
     values[problem.names.index("initial_temperature[warm]")] = 45.0
     (misfit,) = misfits(problem, [values])
+    # The same where the temperatures are known.
+    given = tuple(
+        dataclasses.replace(run, parameters={"initial_temperature": celsius})
+        for run, celsius in zip(experiment.runs, (45.0, 60.0), strict=True)
+    )
+    shared = tuple(unknown for unknown in experiment.unknowns if not unknown.per_run)
+    known = declared_problem(dataclasses.replace(experiment, unknowns=shared, runs=given), given)
+    (again,) = misfits(known, [known.start_values()])
     for k, limit in enumerate((4e-5, 3e-3, 1e-3)):
         assert np.abs(misfit[k::3]).max() < limit
+        assert np.abs(again[k::3]).max() < limit
 
 
 @pytest.mark.slow  # two minutes of compilation; the fast ones fit a coupon

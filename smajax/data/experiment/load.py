@@ -32,7 +32,13 @@ from smajax.data.experiment.plausibility import (
 from smajax.data.experiment.record import Experiment, FromModelFile, Output, Run, Unknown
 from smajax.data.experiment.schema import ExperimentFile, RunSection, read_schema
 from smajax.data.experiment.signals import Reading, ReadRun, read_run, time_unit
-from smajax.data.experiment.unknowns import given_parameters, preset_warnings, run_starts, unknowns
+from smajax.data.experiment.unknowns import (
+    given_parameters,
+    parameters_of_runs,
+    preset_warnings,
+    run_starts,
+    unknowns,
+)
 from smajax.data.readers.noise import LEAST_SAMPLES, estimate_noise
 from smajax.data.readers.read import read_table
 
@@ -323,10 +329,7 @@ def experiment_of(path: Path, file: ExperimentFile, catalogue: Catalogue) -> Exp
     _check_order(path, file, model, values)
     output_names, units = _channel_units(path, file, model)
     _check_runs(path, file, model)
-    overrides = {
-        run.name: given_parameters(path, f"runs.{run.name}.parameters", run.parameters, file, model.parameters)
-        for run in file.runs
-    }
+    overrides = parameters_of_runs(path, file, model)
     for name, own in overrides.items():
         _check_order(path, file, model, {**values, **own}, f"runs.{name}.parameters")
     reading = Reading(

@@ -14,6 +14,7 @@ from smajax.data.experiment.schema import BoxSection, ExperimentFile, PriorSecti
 from smajax.data.experiment.toml_file import Quantity
 
 CELSIUS = ParameterInfo("degC", -273.15, 1500.0)  # of a wire as a run starts, which no parameter says
+START = "initial_temperature"
 
 
 def bounded(path: Path, key: str, value: Quantity, info: ParameterInfo) -> float:
@@ -45,6 +46,25 @@ def given_parameters(
             raise ExperimentError(path, where, f"is given here and is an unknown too; remove this or [unknown.{name}]")
         result[name] = bounded(path, where, value, known[name])
     return result
+
+
+def parameters_of_runs(path: Path, file: ExperimentFile, model: ModelDescription) -> dict[str, dict[str, float]]:
+    """Known values of each run, by its name: of parameters, and the wire's temperature as it starts where no channel gives that."""
+    known = dict(model.parameters)
+    if "temperature" not in model.inputs_required and file.nuisance.initial_temperature is None:
+        known[START] = CELSIUS
+    found = {
+        run.name: given_parameters(path, f"runs.{run.name}.parameters", run.parameters, file, known)
+        for run in file.runs
+    }
+    without = [name for name, own in found.items() if START not in own]
+    if without and len(without) < len(found):
+        raise ExperimentError(
+            path,
+            f"runs.{without[0]}.parameters.{START}",
+            "is missing, and other runs have it; give that of every run, or of none (at rest at the air's temperature)",
+        )
+    return found
 
 
 def _prior(path: Path, key: str, section: PriorSection, info: ParameterInfo, low: float) -> Prior:
