@@ -30,7 +30,8 @@ from smajax.data.experiment.plausibility import (
     run_warnings,
 )
 from smajax.data.experiment.record import Experiment, FromModelFile, Output, Run, Unknown
-from smajax.data.experiment.schema import ExperimentFile, RunSection, read_schema
+from smajax.data.experiment.schema import ExperimentFile, read_schema
+from smajax.data.experiment.shared_columns import check_columns
 from smajax.data.experiment.signals import Reading, ReadRun, read_run, time_unit
 from smajax.data.experiment.unknowns import (
     given_parameters,
@@ -109,25 +110,9 @@ def _check_runs(path: Path, file: ExperimentFile, model: ModelDescription) -> No
                 f"role = 'input', or a constant in [runs.inputs] of run {run.name!r}",
             )
     for run in file.runs:
-        _check_columns(path, file, run)
+        check_columns(path, file, run)
     if not any(run.role == "fit" for run in file.runs):
         raise ExperimentError(path, "runs", "no run has role = 'fit'; give at least one")
-
-
-def _check_columns(path: Path, file: ExperimentFile, run: RunSection) -> None:
-    """An output that is read from the same column of a log as another channel is another quantity than one of them says."""
-    taken: dict[tuple[str | None, str | int], str] = {}
-    for name, channel in sorted(file.channels.items(), key=lambda one: one[1].role):  # inputs first
-        column = run.columns.get(name, channel.column)
-        if column is None:
-            continue
-        first = taken.setdefault(((run.files or {}).get(name, run.file), column), name)
-        if first != name and channel.role == "output":
-            raise ExperimentError(
-                path,
-                f"channels.{name}",
-                f"is read from {column!r} in run {run.name!r}, as {first!r} is; give the column of each, or remove one",
-            )
 
 
 def _step(path: Path, file: ExperimentFile) -> float:
