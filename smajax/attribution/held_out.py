@@ -24,7 +24,7 @@ from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.own_values import on_runs
 from smajax.attribution.paired_errors import Comparison, pooled_rms, runs_compared
-from smajax.attribution.residual_diagnostics import all_noise, diagnosed
+from smajax.attribution.residual_diagnostics import diagnosed, noise_by_output
 from smajax.core.parameters import parameter_values
 from smajax.data.experiment.record import Experiment, Output, Run
 from smajax.fit.integration import unlimited
@@ -140,11 +140,10 @@ def _noise_by_output(
     """Of several outputs whether the residuals of each, in noises of the first, are noise."""
     if len(experiment.outputs) == 1:
         return {}
-    found = {}
-    for output in experiment.outputs:
-        own = [left for left, name in zip(residuals, outputs, strict=True) if name == output.name]
-        found[output.name] = not own or all_noise(own, experiment.noise_sigma, output.noise_given, config)
-    return found
+    names = [output.name for output in experiment.outputs]
+    by_output = [[left for left, own in zip(residuals, outputs, strict=True) if own == name] for name in names]
+    given = [output.noise_given for output in experiment.outputs]
+    return dict(zip(names, noise_by_output(by_output, experiment.noise_sigma, given, config), strict=True))
 
 
 def _run_finding(

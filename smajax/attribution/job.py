@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import jax.numpy as jnp
-
 from smajax.attribution.run_extent import extent_of
 from smajax.core.parameters import parameter_values, parameters
 from smajax.data.experiment.record import Experiment, Run
 from smajax.data.model_catalogue import candidates
 from smajax.fit.base_model import base_model
-from smajax.fit.experiment_problem import free_by_name, own_values
+from smajax.fit.experiment_problem import free_by_name, problem_of
 from smajax.fit.integration import choose_integration, unlimited, with_integration
 from smajax.fit.packed_runs import RunBatch, pack
 from smajax.fit.problem import Problem
@@ -51,13 +49,7 @@ def job_of(experiment: Experiment, integration: Integration | None = None) -> Jo
 
     def problem_with(effects: tuple[str, ...]) -> Problem:
         model = extended(base, effects, {name: value for name, value in known.items() if "." in name})
-        batch = pack(runs, experiment.step, parameter_values(model))
-        sigmas = jnp.asarray([output.noise_sigma for output in experiment.outputs])
-        offsets = tuple(output.offset for output in experiment.outputs)
-        whole = Problem.build(
-            model, batch, sigmas if len(sigmas) > 1 else sigmas[0], offsets, own_values(experiment, runs)
-        )
-        return whole.in_first_noises()
+        return problem_of(experiment, runs, model).in_first_noises()
 
     declared_problem = problem_with(declared)
     extent = extent_of(declared_problem)

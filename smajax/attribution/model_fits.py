@@ -18,7 +18,7 @@ from smajax.attribution.declared_priors import NONE_DECLARED
 from smajax.attribution.every_effect import EVERY
 from smajax.attribution.findings import Reason, Round
 from smajax.attribution.joint_parameters import JointParameters
-from smajax.attribution.residual_diagnostics import all_noise
+from smajax.attribution.residual_diagnostics import noise_by_output
 from smajax.attribution.run_extent import extent_of
 from smajax.attribution.score_test import switches
 from smajax.core.progress import Progress, Result, quiet
@@ -232,7 +232,7 @@ class Search:
         count, sigma = len(self.problem.batch.outputs), float(self.problem.noise_sigma)
         given = self.noises_given or (self.noise_given,) * count
         series = [split_runs(misfit[k::count], mask[k::count]) for k in range(count)]
-        return [not own or all_noise(own, sigma, known, self.config) for own, known in zip(series, given, strict=True)]
+        return noise_by_output(series, sigma, given, self.config)
 
     def rmse(self, misfit: np.ndarray) -> float:
         return float(np.sqrt((misfit**2).sum() / np.asarray(self.problem.batch.mask).sum()))

@@ -50,6 +50,13 @@ def _filter_coefficient(residuals: Sequence[np.ndarray], noise_sigma: float, con
     return found.coefficient if enough and 0.0 < found.coefficient < config.most_filter_coefficient and small else 0.0
 
 
+def noise_by_output(
+    residuals: Sequence[Sequence[np.ndarray]], noise_sigma: float, given: Sequence[bool], config: AttributionConfig
+) -> list[bool]:
+    """`all_noise` of the residuals of each output, in noises of the first, by itself: what one leaves is not made up for by another."""
+    return [not own or all_noise(own, noise_sigma, known, config) for own, known in zip(residuals, given, strict=True)]
+
+
 def all_noise(
     residuals: Sequence[np.ndarray], noise_sigma: float, noise_given: bool = True, config: AttributionConfig = DEFAULT
 ) -> bool:

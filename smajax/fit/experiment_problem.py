@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 import jax.numpy as jnp
 import numpy as np
 
 from smajax.core.parameters import parameter_values
-from smajax.data.experiment.record import Experiment, Run, Unknown
+from smajax.data.experiment.record import Experiment, Prior, Run, Unknown
 from smajax.fit.base_model import base_model
 from smajax.fit.packed_runs import pack
 from smajax.fit.problem import PerRun, Problem
+from smajax.model.system import System
 
 
 def free_by_name(experiment: Experiment, runs: Sequence[Run]) -> dict[str, Unknown]:
@@ -31,8 +33,17 @@ def own_values(experiment: Experiment, runs: Sequence[Run]) -> PerRun:
 
 
 def declared_problem(experiment: Experiment, runs: Sequence[Run]) -> Problem:
-    """The base model, and `runs` as they were measured."""
-    model = base_model(experiment)
+    """The base model, and `runs` as they were measured, with the priors of the unknowns."""
+    free = free_by_name(experiment, runs)
+    return problem_of(
+        experiment, runs, base_model(experiment), {name: one.prior for name, one in free.items() if one.prior}
+    )
+
+
+def problem_of(
+    experiment: Experiment, runs: Sequence[Run], model: System, priors: Mapping[str, Prior] = MappingProxyType({})
+) -> Problem:
+    """`runs` as they were measured, with the outputs of the experiment and the values of single runs, by any `model`."""
     sigmas = jnp.asarray([output.noise_sigma for output in experiment.outputs])
     return Problem.build(
         model,
@@ -40,5 +51,5 @@ def declared_problem(experiment: Experiment, runs: Sequence[Run]) -> Problem:
         sigmas if len(sigmas) > 1 else sigmas[0],
         tuple(output.offset for output in experiment.outputs),
         own_values(experiment, runs),
-        {name: one.prior for name, one in free_by_name(experiment, runs).items() if one.prior is not None},
+        priors,
     )

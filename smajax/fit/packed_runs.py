@@ -58,6 +58,7 @@ def pack(runs: Sequence[Run], dt: float, defaults: dict[str, float], integration
             )
     longest = max(len(run.time) for run in runs)
     names = tuple(sorted({name for run in runs for name in run.parameters}))
+    values = [{**defaults, **run.parameters} for run in runs]
 
     def padded(values: np.ndarray, mode: str) -> np.ndarray:
         short = longest - len(values)
@@ -69,7 +70,7 @@ def pack(runs: Sequence[Run], dt: float, defaults: dict[str, float], integration
         mask=jnp.asarray(
             [padded(np.isfinite(series).astype(float), "zero") for run in runs for series in run.outputs.values()]
         ),
-        overrides=jnp.asarray([[{**defaults, **run.parameters}[name] for name in names] for run in runs]),
+        overrides=jnp.asarray([[own[name] for name in names] for own in values]),
         override_names=names,
         dt=dt,
         outputs=tuple(runs[0].outputs),
@@ -129,14 +130,19 @@ def _compiled_runs(
 
 def simulate_batch(system: System, batch: RunBatch) -> Trajectory:
     """One trajectory per run, numpy's arrays of shape (R, N); outside of `jit`, `vmap` and `grad`."""
-    return simulate_with_outputs(system, batch)[0]
+    runs = [run for _, run in _compiled_runs(system, batch, batch.override_names, np.asarray(batch.overrides))]
+    return _stacked(runs)
 
 
 def simulate_with_outputs(system: System, batch: RunBatch) -> tuple[Trajectory, np.ndarray]:
     """(one trajectory per run, its leaves of shape (R, N); what the sensors of `batch` show, (series, N)), numpy's arrays."""
     runs = list(_compiled_runs(system, batch, batch.override_names, np.asarray(batch.overrides)))
     outputs = [np.asarray(sensor_output(here, run, name)) for here, run in runs for name in batch.outputs]
-    return jax.tree.map(lambda *leaves: np.stack(leaves), *(run for _, run in runs)), np.stack(outputs)
+    return _stacked([run for _, run in runs]), np.stack(outputs)
+
+
+def _stacked(runs: Sequence[Trajectory]) -> Trajectory:
+    return jax.tree.map(lambda *leaves: np.stack(leaves), *runs)
 
 
 def states_by_run(packed: Trajectory, runs: Sequence[Run], names: Sequence[str]) -> dict[str, dict[str, np.ndarray]]:

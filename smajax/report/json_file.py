@@ -71,19 +71,17 @@ def _run(run: RunFinding) -> dict[str, Any]:
         "role": run.role,
         "samples": run.samples,
         "duration": run.time[-1] - run.time[0] if len(run.time) else None,
-        "rmse_before": run.rmse_before,
-        "rmse_after": run.rmse_after,
-        "offset_before": run.offset_before,
-        "offset_after": run.offset_after,
-        "rmse_average": None if run.average is None else run.average.rmse,
-        "band_coverage": None if run.average is None else run.average.coverage,
-        **({"other_outputs": {one.name: _other_output(one) for one in run.others}} if run.others else {}),
+        **_errors(run),
+        **(
+            {"other_outputs": {one.name: {"samples": one.samples, **_errors(one)} for one in run.others}}
+            if run.others
+            else {}
+        ),
     }
 
 
-def _other_output(one: OutputFinding) -> dict[str, Any]:
+def _errors(one: RunFinding | OutputFinding) -> dict[str, Any]:
     return {
-        "samples": one.samples,
         "rmse_before": one.rmse_before,
         "rmse_after": one.rmse_after,
         "offset_before": one.offset_before,
