@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 import jax.numpy as jnp
@@ -25,6 +25,7 @@ from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.own_values import on_runs
 from smajax.attribution.paired_errors import Comparison, pooled_rms, runs_compared
 from smajax.attribution.residual_diagnostics import diagnosed, noise_by_output
+from smajax.attribution.run_finding import BesideModels
 from smajax.core.parameters import parameter_values
 from smajax.data.experiment.record import Experiment, Output, Run
 from smajax.fit.integration import unlimited
@@ -176,20 +177,7 @@ def _run_finding(
     )
 
 
-@dataclass(frozen=True)
-class _BesideModels:
-    """One output of one run beside both models; the offsets are in what these say, and all is as in `RunFinding`."""
-
-    measured: np.ndarray
-    before: np.ndarray
-    after: np.ndarray
-    offset_before: float
-    offset_after: float
-    rmse_before: float
-    rmse_after: float
-
-
-def _beside_models(output: Output, measured: np.ndarray, before: np.ndarray, after: np.ndarray) -> _BesideModels:
+def _beside_models(output: Output, measured: np.ndarray, before: np.ndarray, after: np.ndarray) -> BesideModels:
     there, n = np.isfinite(measured), len(measured)
 
     def beside(reading: np.ndarray) -> tuple[np.ndarray, float, float]:
@@ -198,7 +186,15 @@ def _beside_models(output: Output, measured: np.ndarray, before: np.ndarray, aft
         return reading + offset, offset, float(np.sqrt(np.mean(left**2))) if there.any() else float("nan")
 
     (first, zero, error), (final, zero_after, error_after) = beside(before[:n]), beside(after[:n])
-    return _BesideModels(measured, first, final, zero, zero_after, error, error_after)
+    return BesideModels(
+        measured=measured,
+        before=first,
+        after=final,
+        offset_before=zero,
+        offset_after=zero_after,
+        rmse_before=error,
+        rmse_after=error_after,
+    )
 
 
 def _series(run: Run, states: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -23,18 +23,13 @@ class AveragedRun:
     samples: int  # measured ones
 
 
-@dataclass(frozen=True)
-class OutputFinding:
-    """Another measured output of a run beside the two models; as the first one's in `RunFinding`."""
+@dataclass(frozen=True, kw_only=True)
+class BesideModels:
+    """One measured output of a run beside the two models; every array has shape (n,) on the run's clock, SI."""
 
-    name: str
-    unit: str  # SI
-    noise_sigma: float
-    noise_how: str
-    scale: float  # noise of the first output over its own
-    measured: np.ndarray
-    before: np.ndarray
-    after: np.ndarray
+    measured: np.ndarray  # nan where a sample is missing
+    before: np.ndarray  # base model, the run's own offset included
+    after: np.ndarray  # extended model; equal to `before` when nothing was added
     offset_before: float
     offset_after: float
     rmse_before: float
@@ -47,29 +42,27 @@ class OutputFinding:
         return int(np.isfinite(self.measured).sum())
 
 
-@dataclass(frozen=True)
-class RunFinding:
-    """One measured run beside the two models; every array has shape (n,) on the same clock."""
+@dataclass(frozen=True, kw_only=True)
+class OutputFinding(BesideModels):
+    """Another output of a run than the first."""
+
+    name: str
+    unit: str  # SI
+    noise_sigma: float
+    noise_how: str
+    scale: float  # noise of the first output over its own
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunFinding(BesideModels):
+    """One measured run: its first output, and the others as `others`."""
 
     name: str
     role: Role
     time: np.ndarray  # s
     inputs: dict[str, np.ndarray]  # SI, by channel name
-    measured: np.ndarray  # SI unit of the first output; nan where a sample is missing
-    before: np.ndarray  # base model, the run's own offset included
-    after: np.ndarray  # extended model; equal to `before` when nothing was added
     states: dict[str, np.ndarray]  # of the model after: temperature (C), martensite_fraction (-), stress (Pa)
-    offset_before: float
-    offset_after: float
-    rmse_before: float
-    rmse_after: float
-    average: AveragedRun | None = None
     others: tuple[OutputFinding, ...] = ()  # the other outputs, where there are several
-
-    @property
-    def samples(self) -> int:
-        """Measured ones of the first output."""
-        return int(np.isfinite(self.measured).sum())
 
     def residuals(self, which: Literal["before", "after"]) -> list[np.ndarray]:
         """What a model leaves of the measured samples of every output, those of others in noises times the first one's."""

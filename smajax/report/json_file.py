@@ -23,6 +23,7 @@ from smajax.attribution.findings import (
     UnknownTerm,
     other_outputs,
 )
+from smajax.attribution.run_finding import BesideModels
 from smajax.report.identifiability_words import remark_text
 from smajax.report.narrative import Narrative, narrate
 from smajax.report.narrative.rounds import chosen_text
@@ -80,7 +81,7 @@ def _run(run: RunFinding) -> dict[str, Any]:
     }
 
 
-def _errors(one: RunFinding | OutputFinding) -> dict[str, Any]:
+def _errors(one: BesideModels) -> dict[str, Any]:
     return {
         "rmse_before": one.rmse_before,
         "rmse_after": one.rmse_after,

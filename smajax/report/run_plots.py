@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from smajax.attribution.findings import Findings, OutputFinding, RunFinding
+from smajax.attribution.findings import Findings, RunFinding
+from smajax.attribution.run_finding import BesideModels
 from smajax.core.display_units import Display, display, label
 from smajax.model.channels import channel
 from smajax.report.pictures import autocorrelation, nothing_added
@@ -63,7 +64,7 @@ def output_alone(plot: SeriesPlot, about: str, of: str, height: int = FIRST) -> 
     return SeriesPlot(about, plot.at, (alone,), plot.axis, plot.spans)
 
 
-def models_of(findings: Findings, run: RunFinding | OutputFinding) -> list[tuple[str, np.ndarray, str]]:
+def models_of(findings: Findings, run: BesideModels) -> list[tuple[str, np.ndarray, str]]:
     """The models to draw for one output of a run: name, values, colour. One only when nothing was added."""
     if nothing_added(findings):
         return [("base model", run.before, "after")]
@@ -71,7 +72,7 @@ def models_of(findings: Findings, run: RunFinding | OutputFinding) -> list[tuple
 
 
 def _panels(
-    findings: Findings, one: RunFinding | OutputFinding, sensor: tuple[str, str, float], held_out: bool
+    findings: Findings, one: BesideModels, sensor: tuple[str, str, float], held_out: bool
 ) -> tuple[Panel, Panel]:
     """(an output measured and by the models, of a held-out run with the band of the average; what they leave). sensor: name, unit, noise."""
     name, unit, sigma = sensor
