@@ -132,7 +132,7 @@ def tune_on_models(
     from smajax.cli.progress_display import displayed
     from smajax.control.tuned_on_models import QUICK, tuned_on_models
     from smajax.data.model_file.read import load_model
-    from smajax.report.control_page import conclusions, write_comparison
+    from smajax.report.tuned_on_models_page import conclusions, write_comparison
 
     base, extended = findings.base_model, findings.extended_model
     if base is None or extended is None:

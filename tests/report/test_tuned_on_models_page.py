@@ -14,7 +14,7 @@ import smajax as sma
 from smajax.control.gains_file import Gains, read_gains
 from smajax.control.position_unit import PositionUnit
 from smajax.control.tuned_on_models import ControlComparison, EvaluatedLoop, OtherValue, TunedOnModel, differing
-from smajax.report.control_page import conclusions, rows, worth, write_comparison
+from smajax.report.tuned_on_models_page import conclusions, rows, worth, write_comparison
 from tests.fit.test_predict import kept_model
 
 GAINS = {"proportional_gain": 900.0, "integral_gain": 300.0, "derivative_gain": 20.0, "unwinding_time": 0.4}
