@@ -78,7 +78,7 @@ def rows(wire: str, load: str, drive: str) -> tuple[Row, ...]:
     """Parameters of the three presets. Raises ValueError for presets that do not go together."""
     ready()
     from smajax.core.parameters import parameter_values, parameters
-    from smajax.data.experiment.model_description import WIRE_SIZES
+    from smajax.data.experiment.catalogue import WIRE_SIZES
     from smajax.model.preset_sources import origins_of
     from smajax.model.presets import build
 

@@ -10,7 +10,7 @@ import numpy as np
 from smajax.attribution.findings import AssumedParameter
 from smajax.attribution.job import Job
 from smajax.core.parameters import get_parameters, parameters
-from smajax.data.experiment.model_description import WIRE_SIZES
+from smajax.data.experiment.catalogue import WIRE_SIZES
 from smajax.fit.base_model import base_model
 from smajax.model.channels import REPLACED
 

@@ -71,7 +71,6 @@ MODULES = {
     "effects.every": "attribution.every_effect",
     "effects.neutral": "attribution.neutral",
     "experiment.asked": "data.experiment.fingerprint",
-    "experiment.catalogue": "data.experiment.model_description",
     "experiment.folder": "data.experiment.data_folder",
     "experiment.guess": "data.experiment.column_guess",
     "experiment.own_columns": "data.experiment.column_overrides",

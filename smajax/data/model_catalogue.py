@@ -9,7 +9,7 @@ import numpy as np
 
 from smajax.core.names import listed
 from smajax.core.parameters import parameter_values, parameters, set_parameters
-from smajax.data.experiment.model_description import Catalogue, CoefficientInfo, ModelDescription, ParameterInfo, Scale
+from smajax.data.experiment.catalogue import Catalogue, CoefficientInfo, ModelDescription, ParameterInfo, Scale
 from smajax.model.effects.candidate import PRIOR_ODDS
 from smajax.model.effects.library import LIBRARY
 from smajax.model.effects.prior_width import stated_width

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from smajax.data.experiment.catalogue import ModelDescription
 from smajax.data.experiment.load import load_experiment
-from smajax.data.experiment.model_description import ModelDescription
 from tests.helpers.bench_experiment import BENCH, CATALOGUE, ONE_FIT, changed, describe, load, rewrite, write_run
 
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from smajax.data.experiment.catalogue import Catalogue, ModelDescription, ParameterInfo
 from smajax.data.experiment.load import load_experiment
-from smajax.data.experiment.model_description import Catalogue, ModelDescription, ParameterInfo
 from smajax.data.experiment.record import Experiment
 
 

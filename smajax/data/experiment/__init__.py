@@ -1,6 +1,6 @@
 """`experiment.toml` and the measured files that it names, as one validated record.
 
-In: the file (`schema`), a `Catalogue` of presets and parameters (`model_description`), tables of measured files (`readers`).
+In: the file (`schema`), a `Catalogue` of presets and parameters (`catalogue`), tables of measured files (`readers`).
 Out: `record.Experiment` with `Run`, `Output`, `Unknown`, `Prior` and `DeclaredPriors`; warnings where data are implausible
 (`plausibility`, `magnitude`, `headings`); `ExperimentError` with file, key, value and remedy.
 

@@ -10,9 +10,9 @@ from pathlib import Path
 from smajax.core.names import close_matches
 from smajax.core.units import UnitError, parse_quantity
 from smajax.core.wording import and_listed
+from smajax.data.experiment.catalogue import ModelDescription, ParameterInfo
 from smajax.data.experiment.draft_model import DraftModel
 from smajax.data.experiment.errors import ExperimentError, check_parameter
-from smajax.data.experiment.model_description import ModelDescription, ParameterInfo
 from smajax.data.experiment.name_hints import mass_hint
 from smajax.data.experiment.unknowns import bounded
 from smajax.data.model_catalogue import describe

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from smajax.core.names import close_matches, of_many
 from smajax.core.units import parse_quantity
+from smajax.data.experiment.catalogue import Catalogue, CoefficientInfo, ModelDescription, ParameterInfo
 from smajax.data.experiment.errors import ExperimentError, at_key, check_name
-from smajax.data.experiment.model_description import Catalogue, CoefficientInfo, ModelDescription, ParameterInfo
 from smajax.data.experiment.record import DeclaredPriors, FromModelFile, PriorSpread
 from smajax.data.experiment.schema import CoefficientPriorSection, EffectPriorSection, ExperimentFile, SpreadSection
 from smajax.data.experiment.unknowns import bounded

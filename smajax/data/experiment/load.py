@@ -12,6 +12,7 @@ import numpy as np
 from smajax.core.names import close_matches
 from smajax.core.units import UnitError, convert, parse_quantity
 from smajax.core.wording import and_listed
+from smajax.data.experiment.catalogue import WIRE_SIZES, Catalogue, ModelDescription
 from smajax.data.experiment.column_overrides import own_columns
 from smajax.data.experiment.data_folder import data_folder
 from smajax.data.experiment.declared_priors import declared_priors
@@ -19,7 +20,6 @@ from smajax.data.experiment.errors import ExperimentError, at_key, check_name
 from smajax.data.experiment.from_model_file import with_model_file
 from smajax.data.experiment.headings import heading_warnings
 from smajax.data.experiment.magnitude import common_warnings, magnitude_warnings
-from smajax.data.experiment.model_description import WIRE_SIZES, Catalogue, ModelDescription
 from smajax.data.experiment.motion import motion_warnings
 from smajax.data.experiment.plausibility import (
     constant_warnings,

@@ -8,8 +8,8 @@ from types import MappingProxyType
 import numpy as np
 import scipy  # its parts are imported when they are first used
 
+from smajax.data.experiment.catalogue import Scale
 from smajax.data.experiment.column_guess import in_levels
-from smajax.data.experiment.model_description import Scale
 from smajax.data.experiment.signals import ReadRun
 from smajax.data.readers.table import Array
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from smajax.core.units import parse_quantity
 from smajax.core.wording import and_listed
+from smajax.data.experiment.catalogue import ModelDescription, ParameterInfo
 from smajax.data.experiment.errors import ExperimentError, at_key, check_parameter
-from smajax.data.experiment.model_description import ModelDescription, ParameterInfo
 from smajax.data.experiment.record import RUN_STARTS, Prior, Unknown
 from smajax.data.experiment.schema import BoxSection, ExperimentFile, PriorSection
 from smajax.data.experiment.toml_file import Quantity

@@ -12,8 +12,8 @@ import numpy as np
 
 from smajax.core.parameters import parameter_values, parameters
 from smajax.core.units import parse_quantity
+from smajax.data.experiment.catalogue import ParameterInfo
 from smajax.data.experiment.errors import ExperimentError, at_key, check_name, check_parameter
-from smajax.data.experiment.model_description import ParameterInfo
 from smajax.data.experiment.toml_file import Quantity, read_toml, validated
 from smajax.data.experiment.unknowns import bounded
 from smajax.data.model_catalogue import CATALOGUE, check_together
