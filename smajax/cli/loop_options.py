@@ -71,7 +71,7 @@ Quantum = Annotated[
 
 def noise_option(text: str, unit: PositionUnit, option: str = "--noise") -> float | None:
     """A noise, or a quantum, in the unit shown; None of "". Raises typer.BadParameter."""
-    from smajax.control.interface import noise_of
+    from smajax.control.signal_path import noise_of
 
     with refused(f"'{option}'"):
         return noise_of(text, unit) if text else None

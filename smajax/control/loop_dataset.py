@@ -16,9 +16,9 @@ from smajax.control.closed_loop import ClosedLoop, ClosedLoopSetup, check_answer
 from smajax.control.compiled_loop import measured_loop
 from smajax.control.controllers.base import AbstractController
 from smajax.control.estimators.base import AbstractEstimator
-from smajax.control.interface import check_interface
 from smajax.control.measured_state import Sensor
 from smajax.control.reference import Reference, resting
+from smajax.control.signal_path import check_interface
 from smajax.core.parameters import check_bounds, parameter_values
 from smajax.data.text_input import clock_of, given
 from smajax.model.load.base import AbstractMovingLoad

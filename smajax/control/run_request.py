@@ -20,7 +20,6 @@ from smajax.control.compiled_loop import measured_loop
 from smajax.control.compose import compose, with_values
 from smajax.control.figures_of_merit import SetPointMerit, merit_by_set_point, set_point_spans
 from smajax.control.gains_file import Gains, read_gains
-from smajax.control.interface import between_in_words, check_interface, check_set_points, interface_of, noise_of
 from smajax.control.loop_dataset import labelled_loop
 from smajax.control.loop_settings import LoopInUse, LoopSettings, joined, settings_of
 from smajax.control.model_as_plant import gives_limit, noise_of_file, plant_of, true_plant, with_limit
@@ -43,6 +42,7 @@ from smajax.control.run_notes import (
 )
 from smajax.control.run_result import RunResult, mismatches
 from smajax.control.scales import is_arm
+from smajax.control.signal_path import between_in_words, check_interface, check_set_points, interface_of, noise_of
 from smajax.core.names import close_matches
 from smajax.core.parameters import parameter_values
 from smajax.core.wording import and_listed

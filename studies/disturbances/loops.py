@@ -13,10 +13,10 @@ import numpy as np
 from smajax.control.closed_loop import ClosedLoopSetup, stored_loop
 from smajax.control.controllers.base import AbstractController
 from smajax.control.figures_of_merit import BAND_DEGREES, STEADY_SHARE
-from smajax.control.interface import Interface, interface_of
 from smajax.control.perturbed_plant import OF_ARM, perturbed_plant
 from smajax.control.presets import CONTROLLERS
 from smajax.control.reference import resting
+from smajax.control.signal_path import Interface, interface_of
 from smajax.control.sweep.grid import loop_rows
 from smajax.control.tune.scenarios import tuned_on
 from smajax.model.rigs import arm

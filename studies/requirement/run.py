@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from smajax.control.gains_file import Gains, read_gains, write_gains
-from smajax.control.interface import Interface, interface_of
 from smajax.control.least_time import command_limit, distance
 from smajax.control.presets import CONTROLLERS
+from smajax.control.signal_path import Interface, interface_of
 from smajax.control.sweep.batched_loops import LoopSetup, closed_loops
 from smajax.control.tune.scenarios import tuned_on
 from smajax.core.files import json_text, replace

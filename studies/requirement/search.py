@@ -10,9 +10,9 @@ from scipy.stats import qmc
 
 from smajax.control.controllers.preset import Box
 from smajax.control.gains_file import LARGEST
-from smajax.control.interface import interface_of
 from smajax.control.least_time import Largest
 from smajax.control.presets import CONTROLLERS
+from smajax.control.signal_path import interface_of
 from smajax.control.sweep.batched_loops import LoopSetup
 from smajax.control.sweep.batched_loops import least_times as batched_least_times
 from smajax.control.sweep.grid import loop_rows

@@ -19,12 +19,12 @@ from smajax.control.closed_loop import simulate_closed_loop
 from smajax.control.compose import compose
 from smajax.control.figures_of_merit import MERIT_UNITS, Merit, merit
 from smajax.control.gains_file import Gains
-from smajax.control.interface import Interface, interface_of
 from smajax.control.least_time import least_reach_times
 from smajax.control.load_equation import moving_load
 from smajax.control.measured_state import Sensor
 from smajax.control.presets import CONTROLLERS
 from smajax.control.reference import clock, constant
+from smajax.control.signal_path import Interface, interface_of
 from smajax.control.sweep.batched_loops import LoopSetup, closed_loops
 from smajax.control.sweep.grid import Grid, loop_rows, sweep_ratios
 from smajax.control.sweep.run_sweep import (

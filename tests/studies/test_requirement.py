@@ -10,9 +10,9 @@ import pytest
 
 from smajax.control.estimators.adaptive_filter import AdaptiveFilter
 from smajax.control.gains_file import read_gains
-from smajax.control.interface import interface_of
 from smajax.control.least_time import least_reach_times
 from smajax.control.presets import CONTROLLERS, with_printed_law
+from smajax.control.signal_path import interface_of
 from smajax.control.sweep.batched_loops import LoopSetup, closed_loops
 from smajax.control.sweep.grid import loop_rows
 from smajax.control.tune.terms import TERMS

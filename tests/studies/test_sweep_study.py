@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from smajax.control.interface import interface_of
 from smajax.control.least_time import distance, least_reach_times
 from smajax.control.presets import CONTROLLERS, OF_THE_SOURCE
+from smajax.control.signal_path import interface_of
 from smajax.control.sweep.batched_loops import LoopSetup, closed_loops
 from smajax.control.sweep.run_sweep import sweep_controllers
 from smajax.model.rigs import arm

@@ -157,9 +157,9 @@ def tune_on_models(
 def check_tuning(loaded: Experiment, controller: str, set_points: str) -> tuple[float, ...]:
     """The set points in the unit that is shown, before anything is fitted. Raises typer.BadParameter."""
     from smajax.cli.options import numbers
-    from smajax.control.interface import check_set_points
     from smajax.control.position_unit import unit_of
     from smajax.control.presets import check_controller
+    from smajax.control.signal_path import check_set_points
     from smajax.fit.base_model import base_model
 
     system = base_model(loaded)

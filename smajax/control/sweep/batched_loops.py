@@ -18,10 +18,10 @@ from smajax.control.closed_loop import ClosedLoopSetup, stored_loop
 from smajax.control.controllers.base import AbstractController
 from smajax.control.figures_of_merit import Merit, evaluated_loop
 from smajax.control.gains_file import LARGEST
-from smajax.control.interface import Interface
 from smajax.control.least_time import Largest
 from smajax.control.perturbed_plant import OF_ARM, Perturbation, perturbed_plant
 from smajax.control.reference import clock, constant
+from smajax.control.signal_path import Interface
 from smajax.core.parameters import get_parameters, set_vector
 from smajax.core.progress import Progress, Stage, quiet
 from smajax.model.system import System

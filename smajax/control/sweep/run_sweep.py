@@ -17,7 +17,6 @@ import numpy as np
 from smajax.control.controllers.base import AbstractController
 from smajax.control.figures_of_merit import Merit
 from smajax.control.gains_file import Gains
-from smajax.control.interface import between_in_words, check_interface, check_set_points, default_noise, interface_of
 from smajax.control.least_time import LIMITS, Distance, command_limit, distance
 from smajax.control.mismatch import MISMATCHES, default_mismatches
 from smajax.control.plants import Plants, PlantSet, carrying, plant_set
@@ -25,6 +24,7 @@ from smajax.control.position_unit import PositionUnit, check_unit, default_set_p
 from smajax.control.presets import CONTROLLERS, check_controller, controllers_for
 from smajax.control.reference import clock
 from smajax.control.scales import is_arm, seconds_for
+from smajax.control.signal_path import between_in_words, check_interface, check_set_points, default_noise, interface_of
 from smajax.control.sweep.batched_loops import LoopSetup, closed_loops, integrated_setup, least_times, positions
 from smajax.control.sweep.grid import LEAST, MOST, OF_ARM, PLANT, Grid, loop_rows, sweep_ratios
 from smajax.core.files import json_line, writing

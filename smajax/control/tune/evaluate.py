@@ -19,12 +19,12 @@ from smajax.control.closed_loop import ClosedLoopSetup, observe_closed_loop
 from smajax.control.controllers.base import AbstractController
 from smajax.control.controllers.preset import Box, ControllerPreset
 from smajax.control.figures_of_merit import Merit, merit_observer
-from smajax.control.interface import Interface
 from smajax.control.load_equation import stroke_of
 from smajax.control.perturbed_plant import Perturbation, perturbed_plant
 from smajax.control.plants import PlantSet, plant_set
 from smajax.control.reference import clock, constant
 from smajax.control.scales import arm_scales, is_arm
+from smajax.control.signal_path import Interface
 from smajax.control.sweep.batched_loops import NUMBER, TARGET
 from smajax.control.tune.scenarios import Scenarios
 from smajax.control.tune.terms import TERMS, Terms, exact_vector, factors_in, term_observer, term_vector

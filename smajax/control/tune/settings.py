@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from smajax.control.gains_file import fixed_parameters
-from smajax.control.interface import between_in_words, check_interface, check_set_points
 from smajax.control.plants import Plants, PlantSet, plant_set
 from smajax.control.position_unit import (
     PositionUnit,
@@ -19,6 +18,7 @@ from smajax.control.position_unit import (
 )
 from smajax.control.presets import CONTROLLERS, check_controller
 from smajax.control.scales import is_arm, seconds_for
+from smajax.control.signal_path import between_in_words, check_interface, check_set_points
 from smajax.control.tune import adam
 from smajax.control.tune.evaluate import STEP
 from smajax.control.tune.multistart import Effort

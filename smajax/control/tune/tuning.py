@@ -10,12 +10,12 @@ import numpy as np
 
 from smajax.control.controllers.base import AbstractController
 from smajax.control.gains_file import Gains, fixed_parameters
-from smajax.control.interface import interface_of
 from smajax.control.loop_settings import LoopInUse, LoopSettings, settings_of
 from smajax.control.mismatch import MISMATCHES
 from smajax.control.plants import Plants, PlantSet, carrying, plant_set
 from smajax.control.presets import CONTROLLERS
 from smajax.control.scales import unit_on
+from smajax.control.signal_path import interface_of
 from smajax.control.sweep.batched_loops import LoopSetup, integrated_setup, positions
 from smajax.control.tune.cma_es import CmaEsState, SearchTask, evolve
 from smajax.control.tune.evaluate import FINE, LOOPS, STEP, Evaluation, TuningProblem
