@@ -17,8 +17,8 @@ from smajax.engine.jax_versions import kind_of
 from smajax.engine.values import held
 from smajax.export.arrays import numbers_of
 from smajax.export.block import Block, Quantity, identifier
+from smajax.export.c_text import texts_of
 from smajax.export.counts import Cost, cost_of
-from smajax.export.printed import texts_of
 from smajax.export.single_precision import DOUBLE
 from smajax.export.statements import NAMES, Item, Number, Writer, needed
 from smajax.export.translate import Translation

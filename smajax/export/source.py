@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from smajax.export.block import Block, Quantity
+from smajax.export.c_text import helpers_of, merged, printed
 from smajax.export.compiled import Body, Compiled, Entry, compiled
 from smajax.export.operations import type_of
-from smajax.export.printed import helpers_of, merged, printed
 from smajax.export.single_precision import DOUBLE, SINGLE, UNKNOWN, SingleBuild
 from smajax.export.statements import NAMES
 

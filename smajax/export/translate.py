@@ -22,8 +22,8 @@ from smajax.engine.text import Unsupported
 from smajax.engine.values import Held, held
 from smajax.export.arrays import Value, is_known, moved, numbers_of, part_at, product, reduced, settled, with_entry
 from smajax.export.errors import NoTranslation, part_of
+from smajax.export.loop_bounds import most_rounds
 from smajax.export.operations import ELEMENTWISE
-from smajax.export.rounds import most_rounds
 from smajax.export.statements import Branch, Cell, Loop, Number, Store, Writer, literal
 
 CALLS = {name for name, own in TABLE.items() if "program" in own and name != "scan"}
