@@ -56,8 +56,8 @@ def draft_file(project: Project, logs: Sequence[Path], choice: Mapping[str, str]
     file is as before.
     """
     ready()
-    from smajax.data.experiment.bench_facts import BenchFacts
     from smajax.data.experiment.draft import draft
+    from smajax.data.experiment.draft_facts import BenchFacts
     from smajax.data.experiment.draft_model import ModelChoice
     from smajax.data.model_catalogue import describe
 

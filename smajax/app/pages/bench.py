@@ -75,7 +75,7 @@ def _other_model(project: Project, sent: Sent, asked: Mapping[str, str]) -> None
 def _resistance(project: Project, sent: Sent) -> None:
     """Resistivities from the resistance of the cold wire, by the functions of `new-experiment --ohms`."""
     ready()
-    from smajax.data.experiment.bench_facts import PHASES, BenchFacts, checked
+    from smajax.data.experiment.draft_facts import PHASES, BenchFacts, checked
     from smajax.data.model_catalogue import describe
 
     file = project.file
@@ -132,7 +132,7 @@ def _beside_the_values(project: Project, said: Mapping[str, str], head: str) -> 
     file = project.file
     if file is None or head not in project.text:
         return
-    from smajax.data.experiment.bench_facts import Known
+    from smajax.data.experiment.draft_facts import Known
     from smajax.data.experiment.draft_model import DraftModel
     from smajax.data.experiment.draft_parameters import ordered, preset_parameters
 

@@ -82,8 +82,8 @@ def new_experiment(
 
     prepare()
     from smajax.cli.draft_file import write_draft
-    from smajax.data.experiment.bench_facts import BenchFacts
     from smajax.data.experiment.draft import draft
+    from smajax.data.experiment.draft_facts import BenchFacts
     from smajax.data.experiment.draft_model import ModelChoice
 
     bench = BenchFacts(given, ohms, ohms_per_metre, masses, others)

@@ -12,7 +12,6 @@ import numpy as np
 
 from smajax.core.units import convert
 from smajax.core.wording import and_listed
-from smajax.data.experiment.bench_facts import BenchFacts, Known, facts_of
 from smajax.data.experiment.column_guess import (
     GUESS,
     LIKELY,
@@ -22,6 +21,7 @@ from smajax.data.experiment.column_guess import (
     time_unit_of,
     times_not_read,
 )
+from smajax.data.experiment.draft_facts import BenchFacts, Known, facts_of
 from smajax.data.experiment.draft_model import DraftModel, ModelChoice, choose_model
 from smajax.data.experiment.draft_parameters import PresetLine, kept_parameters, ordered, preset_parameters
 from smajax.data.experiment.first_force import first_force

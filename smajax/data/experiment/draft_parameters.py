@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from smajax.core.parameters import parameter_values, parameters
-from smajax.data.experiment.bench_facts import Known
 from smajax.data.experiment.catalogue import WIRE_SIZES
+from smajax.data.experiment.draft_facts import Known
 from smajax.data.experiment.draft_model import DraftModel
 from smajax.data.experiment.toml_file import quantity, toml_key, toml_value
 from smajax.data.model_file.actuator_model import ActuatorModel

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from smajax.core.parameters import parameter_values
-from smajax.data.experiment.bench_facts import BenchFacts
 from smajax.data.experiment.draft import Draft, draft
+from smajax.data.experiment.draft_facts import BenchFacts
 from smajax.data.experiment.draft_model import ModelChoice
 from smajax.data.experiment.errors import ExperimentError
 from smajax.data.experiment.load import load_experiment
