@@ -9,7 +9,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from smajax.attribution.findings import Findings, ParameterFinding, Role, Verdict, coverage, pooled_rmse
+from smajax.attribution.findings import Findings, ParameterFinding, Role, coverage, pooled_rmse
 from smajax.core.display_units import chance, correlation, digits, display, label, p_value, with_error
 from smajax.core.wording import and_listed, per_cent
 from smajax.fit.uncertainty import RemarkKind
@@ -22,18 +22,12 @@ from smajax.report.narrative import Narrative, narrate
 from smajax.report.narrative.rounds import chosen_text
 from smajax.report.narrative.unknown import units
 from smajax.report.narrative.values import far_text
+from smajax.report.narrative.verdict import VERDICTS
 from smajax.report.next_steps import Step, section
 from smajax.report.plain_page import MANY, breakable
 from smajax.report.series_picture import COARSE, series, series_of_runs
 from smajax.report.unknown_pictures import function_learnt
 
-VERDICTS = {
-    Verdict.ADEQUATE: ("The model is adequate", "good"),
-    Verdict.EXPLAINED: ("The missing physics is found", "good"),
-    Verdict.PARTLY_EXPLAINED: ("Part of the missing physics is found", "fair"),
-    Verdict.NOT_FINISHED: ("Not finished", "fair"),
-    Verdict.NOT_IN_LIBRARY: ("Something is missing that the library does not hold", "poor"),
-}
 # Headings of the evidence in the order of the stages; a number with no heading here is shown under its own name.
 EVIDENCE = {
     "posterior_probability": "posterior probability",

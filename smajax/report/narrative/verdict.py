@@ -1,4 +1,4 @@
-"""The verdict and what it rests on, in sentences."""
+"""The verdict and what it rests on, in words: the headline of each verdict, and sentences."""
 
 from __future__ import annotations
 
@@ -26,6 +26,15 @@ from smajax.report.narrative.rounds import reason_text
 from smajax.report.narrative.unknown import unknown_sentences
 from smajax.report.narrative.values import error_text, value_text
 from smajax.report.range_words import range_sentences
+
+# Headline of the page, and its tone.
+VERDICTS = {
+    Verdict.ADEQUATE: ("The model is adequate", "good"),
+    Verdict.EXPLAINED: ("The missing physics is found", "good"),
+    Verdict.PARTLY_EXPLAINED: ("Part of the missing physics is found", "fair"),
+    Verdict.NOT_FINISHED: ("Not finished", "fair"),
+    Verdict.NOT_IN_LIBRARY: ("Something is missing that the library does not hold", "poor"),
+}
 
 
 def summary(findings: Findings) -> tuple[str, ...]:
