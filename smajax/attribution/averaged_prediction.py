@@ -23,7 +23,7 @@ from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.likely_models_check import checked
 from smajax.attribution.model_fits import Model, Search
-from smajax.attribution.own_values import on_runs, with_other_runs
+from smajax.attribution.values_per_run import on_runs, with_other_runs
 from smajax.fit.packed_runs import RunBatch
 from smajax.fit.prediction_band import BAND, averaged_band, reading_of
 

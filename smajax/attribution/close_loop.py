@@ -12,11 +12,12 @@ from pathlib import Path
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.attribution.assumed import assumed, expansion_not_given
+from smajax.attribution.assumed_parameters import assumed, expansion_not_given
 from smajax.attribution.averaged_prediction import Averaged, averaged, with_averages
 from smajax.attribution.config import AttributionConfig
 from smajax.attribution.confounders import confounders
 from smajax.attribution.declared_priors import of_unknowns
+from smajax.attribution.final_model_findings import effects_found, parameters_found, priors_found
 from smajax.attribution.findings import (
     Findings,
     NoiseWithoutRun,
@@ -25,7 +26,6 @@ from smajax.attribution.findings import (
     Remaining,
     Verdict,
 )
-from smajax.attribution.found import effects_found, parameters_found, priors_found
 from smajax.attribution.held_out import Compared, compare, every_run, validated
 from smajax.attribution.input_of_run import corrected, record_error
 from smajax.attribution.job import Job, effects_excluded, job_of
@@ -33,7 +33,7 @@ from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.joint_stage import base_alone, likeliest_so_far, search_by_evidence, search_without
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
-from smajax.attribution.neutral import check_neutral
+from smajax.attribution.neutral_at_base import check_neutral
 from smajax.attribution.outlier_run import outlier_runs
 from smajax.attribution.record_error import OutlierRun, RecordError
 from smajax.attribution.saved_model import fit_run_states, saved_model

@@ -22,10 +22,10 @@ from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.joint_stage import final_model, without
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
-from smajax.attribution.own_values import on_runs
 from smajax.attribution.paired_errors import Comparison, pooled_rms, runs_compared
 from smajax.attribution.residual_diagnostics import diagnosed, noise_by_output
 from smajax.attribution.run_finding import BesideModels
+from smajax.attribution.values_per_run import on_runs
 from smajax.core.parameters import parameter_values
 from smajax.data.experiment.record import Experiment, Output, Run
 from smajax.fit.integration import unlimited

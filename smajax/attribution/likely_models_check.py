@@ -15,9 +15,9 @@ from smajax.attribution.findings import DroppedModel, HeldOutWorse, StepDependen
 from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
-from smajax.attribution.own_values import held_out_owners, held_out_residuals
 from smajax.attribution.paired_errors import compared, pooled_rms
 from smajax.attribution.step_size_check import gain_kept_at_half_step
+from smajax.attribution.values_per_run import held_out_owners, held_out_residuals
 from smajax.model.effects.library import LIBRARY
 
 CHECKED = 0.05  # weight above which a model is looked at

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.averaged_prediction import Averaged, likely_models, prediction_errors
-from smajax.attribution.found import ParametersFound
+from smajax.attribution.final_model_findings import ParametersFound
 from smajax.attribution.job import Job
 from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.laplace_evidence import FittedModel

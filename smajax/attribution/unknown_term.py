@@ -23,12 +23,12 @@ from smajax.attribution.joint_search import comparison_settings, fits_by_program
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model, independent_error
 from smajax.attribution.leave_one_run_out import predicting
 from smajax.attribution.model_fits import Model, Search
-from smajax.attribution.own_values import held_out_owners, held_out_residuals
 from smajax.attribution.paired_errors import compared, pooled_rms
 from smajax.attribution.score_test import Score, ranked
 from smajax.attribution.unknown.ranges import Sought, sought
 from smajax.attribution.unknown.spline import design
 from smajax.attribution.unknown.terms import UNKNOWN
+from smajax.attribution.values_per_run import held_out_owners, held_out_residuals
 from smajax.core.parameters import parameters
 from smajax.core.progress import Stage
 from smajax.core.whiteness import correlation_time, split_runs

@@ -92,7 +92,7 @@ def _plugin_faults() -> list[str]:
     except PluginError as error:
         return faults + str(error).splitlines()
     if not faults:  # a run needs a load
-        from smajax.attribution.neutral import not_neutral
+        from smajax.attribution.neutral_at_base import not_neutral
 
         faults += not_neutral()
     return faults

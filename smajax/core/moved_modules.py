@@ -35,7 +35,9 @@ PACKAGES = {
 # Old module -> new one, both below `smajax`.
 MODULES = {
     "adaptive": "simulation.adaptive_steps",
+    "attribution.assumed": "attribution.assumed_parameters",
     "attribution.extent": "attribution.run_extent",
+    "attribution.found": "attribution.final_model_findings",
     "attribution.judging": "attribution.model_fits",
     "attribution.lone_run": "attribution.outlier_run",
     "attribution.places": "attribution.nuisance_grid",
@@ -69,7 +71,7 @@ MODULES = {
     "design": "fit.design",
     "doctor": "cli.installation",
     "effects.every": "attribution.every_effect",
-    "effects.neutral": "attribution.neutral",
+    "effects.neutral": "attribution.neutral_at_base",
     "experiment.asked": "data.experiment.fingerprint",
     "experiment.folder": "data.experiment.data_folder",
     "experiment.guess": "data.experiment.column_guess",

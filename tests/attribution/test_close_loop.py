@@ -13,10 +13,10 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from smajax.attribution.assumed import assumed, expansion_not_given
+from smajax.attribution.assumed_parameters import assumed, expansion_not_given
 from smajax.attribution.close_loop import close_loop
+from smajax.attribution.final_model_findings import over_runs
 from smajax.attribution.findings import Findings, pooled_rmse
-from smajax.attribution.found import over_runs
 from smajax.attribution.job import job_of
 from smajax.attribution.model_fits import Model
 from smajax.core.parameters import get_parameters, parameters, set_parameters

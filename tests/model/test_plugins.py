@@ -265,7 +265,7 @@ def test_the_loop_refuses_an_effect_that_is_not_neutral_and_says_by_how_much(tmp
     assert ended.returncode == 2, ended.stderr
     assert re.search(r"changes the position by up to [0-9.]+ mm, the temperature by up to [0-9.]+ °C", ended.stderr)
     assert "Traceback" not in ended.stderr
-    neutral = "from smajax.core.runtime import prepare; prepare(); from smajax.attribution.neutral import check_neutral; check_neutral()"
+    neutral = "from smajax.core.runtime import prepare; prepare(); from smajax.attribution.neutral_at_base import check_neutral; check_neutral()"
     (tmp_path / "airflow-1.2.dist-info" / "entry_points.txt").write_text("[smajax.effects]\nbreeze = airflow:Breeze\n")
     ended = _asked(neutral, _with(tmp_path), tmp_path)
     assert ended.returncode == 0, ended.stderr
