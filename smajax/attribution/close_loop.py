@@ -38,7 +38,7 @@ from smajax.attribution.outlier_run import outlier_runs
 from smajax.attribution.record_error import OutlierRun, RecordError
 from smajax.attribution.saved_model import fit_run_states, saved_model
 from smajax.attribution.step_size_check import finer_integration, integration_error_of
-from smajax.attribution.unknown_term import Lacking, in_place_of, unknown_terms
+from smajax.attribution.unknown.search import Lacking, in_place_of, unknown_terms
 from smajax.attribution.verdict import verdict_of
 from smajax.core.progress import Progress, Result, Stage, as_progress, quiet, report_warnings
 from smajax.core.provenance import made_with

@@ -20,9 +20,9 @@ from smajax.attribution.findings import UnknownTerm, UnknownTermLikelier
 from smajax.attribution.formulas import formulas
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.unknown.ranges import Sought
+from smajax.attribution.unknown.search import Lacking, in_place_of, unknown_terms, with_terms
 from smajax.attribution.unknown.spline import COUNT, design, spline
 from smajax.attribution.unknown.terms import UNKNOWN
-from smajax.attribution.unknown_term import Lacking, in_place_of, unknown_terms, with_terms
 from smajax.core.parameters import parameters
 from smajax.core.result_cache import ResultCache
 from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
