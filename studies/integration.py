@@ -25,8 +25,8 @@ from smajax.core.parameters import parameter_values, set_parameters
 from smajax.core.runtime import prepare
 from smajax.data.experiment.record import Run
 from smajax.fit.integration import choose_integration, described, with_integration
+from smajax.fit.outputs_of_runs import predicted_and_derivatives
 from smajax.fit.packed_runs import pack, predict_compiled
-from smajax.fit.predicted import predicted_and_derivatives
 from smajax.fit.problem import Problem
 from smajax.model.presets import build
 from smajax.model.system import System, initial_state

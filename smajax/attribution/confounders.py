@@ -15,7 +15,7 @@ from smajax.attribution.score_test import scaled
 from smajax.attribution.traces import Traces, traces_at
 from smajax.data.experiment.record import Run
 from smajax.fit.design import candidate_problem
-from smajax.fit.predicted import predicted_at
+from smajax.fit.outputs_of_runs import predicted_at
 
 # Of itself: all that is left, by rounding, of a trace that other parameters make as well.
 ABSORBED = 1e-6

@@ -28,7 +28,7 @@ from smajax.attribution.record_error import RecordError
 from smajax.core.parameters import parameters
 from smajax.data.experiment.record import Experiment, Run
 from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
-from smajax.fit.predicted import misfits
+from smajax.fit.outputs_of_runs import misfits
 from smajax.fit.problem import PerRun, Problem
 from smajax.fit.starts import nearest
 from smajax.model.effects.candidate import PRIOR_ODDS

@@ -20,7 +20,7 @@ from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model
 from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
-from smajax.fit.predicted import misfits
+from smajax.fit.outputs_of_runs import misfits
 from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import sensitivity
 

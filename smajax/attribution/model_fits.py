@@ -26,8 +26,8 @@ from smajax.core.result_cache import ResultCache
 from smajax.core.whiteness import split_runs
 from smajax.data.experiment.record import DeclaredPriors, Prior
 from smajax.fit.levenberg_marquardt import Fit, FitSettings, levenberg_marquardt
+from smajax.fit.outputs_of_runs import misfits
 from smajax.fit.packed_runs import RunBatch
-from smajax.fit.predicted import misfits
 from smajax.fit.problem import Problem
 from smajax.fit.starts import multistart, perturbed_restarts
 from smajax.fit.uncertainty import at_bound

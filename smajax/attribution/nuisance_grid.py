@@ -16,7 +16,7 @@ import numpy as np
 from smajax.attribution.model_fits import Model, Search, nudged
 from smajax.attribution.score_test import Score, ranked, samples_per_independent, score_of, switches, without
 from smajax.fit.integration import with_integration
-from smajax.fit.predicted import predicted_and_derivatives
+from smajax.fit.outputs_of_runs import predicted_and_derivatives
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.model.effects.library import LIBRARY
 from smajax.simulation.steppers import ONE_STEP

@@ -14,7 +14,7 @@ import numpy as np
 
 from smajax.attribution.model_fits import Model, Search, Start
 from smajax.attribution.record_error import OutlierRun
-from smajax.fit.predicted import misfits
+from smajax.fit.outputs_of_runs import misfits
 
 SETTLED = 0.02  # of what one sample adds to the cost
 FIRST = 1e-3  # relative decrease at which the first fits end: they only tell which come near noise or halve an error, and those go on

@@ -13,8 +13,8 @@ import numpy as np
 
 from smajax.attribution.model_fits import Model, Search, Start, base_value
 from smajax.fit.integration import IntegrationError, choose_integration, described, integration_error
+from smajax.fit.outputs_of_runs import predicted_at
 from smajax.fit.packed_runs import RunBatch, halved
-from smajax.fit.predicted import predicted_at
 from smajax.fit.problem import Problem
 from smajax.model.effects.library import LIBRARY
 from smajax.model.system import System

@@ -15,7 +15,7 @@ import numpy as np
 from smajax.attribution.joint_parameters import NUDGE, JointParameters, residual_and_columns
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.fit.integration import with_integration
-from smajax.fit.predicted import predicted_and_derivatives
+from smajax.fit.outputs_of_runs import predicted_and_derivatives
 from smajax.model.effects.candidate import Extent
 from smajax.model.effects.library import LIBRARY
 from smajax.simulation.steppers import ONE_STEP

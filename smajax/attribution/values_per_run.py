@@ -13,8 +13,8 @@ import numpy as np
 from smajax.attribution.model_fits import Search
 from smajax.core.whiteness import split_runs
 from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
+from smajax.fit.outputs_of_runs import misfits
 from smajax.fit.packed_runs import RunBatch
-from smajax.fit.predicted import misfits
 from smajax.fit.problem import PerRun, Problem
 from smajax.fit.sensitivity import sensitivity
 

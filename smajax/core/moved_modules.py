@@ -84,7 +84,7 @@ MODULES = {
     "fit.box": "fit.levenberg_marquardt",
     "fit.kept": "core.result_cache",
     "fit.progress": "core.progress",
-    "fit.shown": "fit.predicted",
+    "fit.shown": "fit.outputs_of_runs",
     "friction": "model.load.friction",
     "gain_search": "control.gain_search",
     "gains_file": "control.gains_file",

@@ -43,7 +43,7 @@ from smajax.fit.bounded_descent import (
     SearchState,
     bounded_quadratic_minimum,
 )
-from smajax.fit.predicted import chunks, predicted_and_derivatives
+from smajax.fit.outputs_of_runs import chunks, predicted_and_derivatives
 from smajax.fit.problem import FitTask, Problem
 
 MAX_STEPS = 120

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from smajax.fit.levenberg_marquardt import Fit
-from smajax.fit.predicted import misfits
+from smajax.fit.outputs_of_runs import misfits
 from smajax.fit.problem import Problem
 from smajax.fit.robust import NORMAL
 

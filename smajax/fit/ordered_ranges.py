@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from smajax.fit.levenberg_marquardt import Fit, FitSettings, levenberg_marquardt
-from smajax.fit.predicted import total_costs
+from smajax.fit.outputs_of_runs import total_costs
 from smajax.fit.problem import FitTask, Problem
 from smajax.model.wire.kinetics import NARROWEST_RANGE
 from smajax.model.wire.order import RANGES

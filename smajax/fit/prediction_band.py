@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy  # its parts are imported when they are first used
 
-from smajax.fit.predicted import predicted_and_derivatives
+from smajax.fit.outputs_of_runs import predicted_and_derivatives
 from smajax.fit.problem import Problem
 
 BAND = 0.9  # share of the measured samples that are expected in the band

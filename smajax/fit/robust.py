@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.fit.levenberg_marquardt import Fit
-from smajax.fit.predicted import misfits
+from smajax.fit.outputs_of_runs import misfits
 from smajax.fit.problem import Problem
 
 BEND = 1.345  # deviations beyond which a sample counts less: 95 % as efficient as least squares for normal noise

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from smajax.fit.predicted import predicted_and_derivatives
+from smajax.fit.outputs_of_runs import predicted_and_derivatives
 from smajax.fit.problem import Problem
 
 

@@ -12,7 +12,7 @@ from smajax.core.progress import Stage
 from smajax.core.result_cache import ResultCache
 from smajax.fit.levenberg_marquardt import Fit, FitSettings, levenberg_marquardt
 from smajax.fit.ordered_ranges import in_order
-from smajax.fit.predicted import total_costs
+from smajax.fit.outputs_of_runs import total_costs
 from smajax.fit.problem import FitTask, Problem
 
 MARGIN = 0.02  # share of the range that starts keep from its bounds

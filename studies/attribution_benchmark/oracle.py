@@ -15,8 +15,8 @@ from smajax.core.parameters import parameter_values
 from smajax.core.progress import quiet
 from smajax.core.result_cache import ResultCache
 from smajax.data.experiment.record import Experiment
+from smajax.fit.outputs_of_runs import misfits
 from smajax.fit.packed_runs import pack
-from smajax.fit.predicted import misfits
 from smajax.fit.problem import Problem
 from smajax.model.effects.library import LIBRARY
 

@@ -23,7 +23,7 @@ from smajax.data.experiment.record import Experiment
 from smajax.data.model_catalogue import CATALOGUE
 from smajax.fit.experiment_problem import declared_problem
 from smajax.fit.identify import identify
-from smajax.fit.predicted import misfits, sums_of_squares
+from smajax.fit.outputs_of_runs import misfits, sums_of_squares
 from smajax.report.csv_files import findings_runs
 from smajax.report.html import findings_to_html
 from smajax.report.json_file import findings_to_json

@@ -18,7 +18,7 @@ from smajax.attribution.subset_evidence import linear_model
 from smajax.attribution.traces import Variant, traces_at
 from smajax.core.parameters import parameter_values, parameters
 from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
-from smajax.fit.predicted import misfits
+from smajax.fit.outputs_of_runs import misfits
 from smajax.fit.preset_priors import preset_priors
 from smajax.fit.starts import logarithmic_points
 from smajax.model.effects.library import LIBRARY

@@ -20,8 +20,8 @@ from smajax.core.progress import quiet
 from smajax.core.result_cache import ResultCache
 from smajax.data.open_experiment import open_experiment
 from smajax.fit.integration import described
+from smajax.fit.outputs_of_runs import misfits
 from smajax.fit.packed_runs import RunBatch, halved, simulate_batch
-from smajax.fit.predicted import misfits
 from smajax.fit.problem import Problem
 from smajax.model.extended import extended
 from smajax.model.presets import build

@@ -26,8 +26,8 @@ from smajax.attribution.unknown.terms import UNKNOWN
 from smajax.core.parameters import parameters
 from smajax.core.result_cache import ResultCache
 from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
+from smajax.fit.outputs_of_runs import misfits, predicted_at
 from smajax.fit.packed_runs import RunBatch, simulate_batch
-from smajax.fit.predicted import misfits, predicted_at
 from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import sensitivity
 from smajax.model.effects.base import AbstractEffect

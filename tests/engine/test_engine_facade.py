@@ -33,7 +33,7 @@ from smajax.engine import (
 from smajax.engine import program as compiled_program
 from smajax.engine.facade import _programs
 from smajax.fit.experiment_problem import declared_problem
-from smajax.fit.predicted import predicted_and_derivatives
+from smajax.fit.outputs_of_runs import predicted_and_derivatives
 from smajax.model.presets import build
 from smajax.simulation.compiled import simulate_compiled
 from tests.helpers.engine_results import summed

@@ -20,7 +20,7 @@ from smajax.data.model_catalogue import CATALOGUE
 from smajax.fit.experiment_problem import declared_problem
 from smajax.fit.identify import identify
 from smajax.fit.identify_result import Estimate, Identified
-from smajax.fit.predicted import misfits
+from smajax.fit.outputs_of_runs import misfits
 from smajax.fit.uncertainty import RemarkKind
 from smajax.model.presets import build
 from smajax.report.identify_page import page

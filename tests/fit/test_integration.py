@@ -18,7 +18,7 @@ from smajax.fit.integration import (
     with_integration,
 )
 from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
-from smajax.fit.predicted import predicted_and_derivatives, predicted_at
+from smajax.fit.outputs_of_runs import predicted_and_derivatives, predicted_at
 from smajax.fit.problem import Problem
 from smajax.simulation.steppers import ONE_STEP, Integration
 from studies import integration as study

@@ -9,8 +9,8 @@ import pytest
 from smajax.core.parameters import parameter_values
 from smajax.data.experiment.record import Run
 from smajax.fit.integration import with_integration
+from smajax.fit.outputs_of_runs import predicted_and_derivatives
 from smajax.fit.packed_runs import pack
-from smajax.fit.predicted import predicted_and_derivatives
 from smajax.fit.problem import Problem
 from smajax.model.extended import extended
 from smajax.model.presets import build

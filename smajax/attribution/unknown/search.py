@@ -34,7 +34,7 @@ from smajax.core.progress import Stage
 from smajax.core.whiteness import correlation_time, split_runs
 from smajax.data.experiment.record import Prior
 from smajax.fit.levenberg_marquardt import FitSettings
-from smajax.fit.predicted import misfits
+from smajax.fit.outputs_of_runs import misfits
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.fit.starts import nearest
 from smajax.fit.uncertainty import covariance_of, uncertainty

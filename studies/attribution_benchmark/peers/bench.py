@@ -17,8 +17,8 @@ from smajax.data.experiment.record import Experiment
 from smajax.data.model_catalogue import CATALOGUE, candidates
 from smajax.fit.base_model import base_model
 from smajax.fit.levenberg_marquardt import Fit
+from smajax.fit.outputs_of_runs import misfits
 from smajax.fit.packed_runs import pack
-from smajax.fit.predicted import misfits
 from smajax.fit.problem import Problem
 from smajax.model.extended import extended
 
