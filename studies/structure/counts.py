@@ -77,7 +77,7 @@ def _contracts(package: Package) -> dict[str, int]:
     nodes = [node for module in package.nodes.values() for node in module]
     classes = {node.name: node for node in nodes if isinstance(node, ast.ClassDef)}
     names = ["AbstractEffect"]
-    for node in package.nodes.get("smajax.model.effects.contracts", []):
+    for node in package.nodes.get("smajax.model.effects.contract_check", []):
         if (
             isinstance(node, ast.AnnAssign)
             and ast.unparse(node.target) == "CONTRACTS"

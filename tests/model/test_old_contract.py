@@ -12,7 +12,7 @@ import pytest
 from smajax.core.parameters import parameter
 from smajax.model.drive.supply import Circuit
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.contracts import CONTRACTS, methods
+from smajax.model.effects.contract_check import CONTRACTS, methods
 from smajax.model.effects.grouping import grouped
 from smajax.model.effects.old_contract import OLD
 from smajax.model.load.force import EndMotion

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from smajax.model.drive.inputs import CommandTerm, InputLagTerm
 from smajax.model.drive.supply import SeriesTerm, SupplyTerm, SupplyTerms
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.contracts import contract_fault
+from smajax.model.effects.contract_check import contract_fault
 from smajax.model.effects.old_contract import adopt
 from smajax.model.load.force import ForceTerm
 from smajax.model.load.friction import FrictionTerm

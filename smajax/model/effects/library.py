@@ -11,7 +11,7 @@ from smajax.core.names import close_matches
 from smajax.core.plugins import EFFECTS, brought
 from smajax.model.effects.base import AbstractEffect
 from smajax.model.effects.candidate import EQUATIONS, ORIGINS, PRIOR_CLASSES, SCALES
-from smajax.model.effects.contracts import contract_fault
+from smajax.model.effects.contract_check import contract_fault
 from smajax.model.effects.old_contract import adopt
 
 # A line each: the file in this folder, which has the effect of the same name. What was recorded comes before what the drive

@@ -18,7 +18,7 @@ from smajax.model.drive.inputs import CommandTerm, InputLagTerm
 from smajax.model.drive.supply import NO_VOLTAGE, SeriesTerm, SupplyTerm
 from smajax.model.effects.base import AbstractEffect
 from smajax.model.effects.candidate import Candidate
-from smajax.model.effects.contracts import CONTRACTS, methods
+from smajax.model.effects.contract_check import CONTRACTS, methods
 from smajax.model.load.force import ForceTerm
 from smajax.model.load.friction import FrictionTerm
 from smajax.model.load.mounting import MountingTerm

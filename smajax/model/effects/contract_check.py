@@ -1,4 +1,4 @@
-"""Every contract of an equation in one list, for what has to look through them all."""
+"""Whether an effect changes an equation by a contract, and every contract in one list, for what has to look through them all."""
 
 from __future__ import annotations
 
