@@ -1,7 +1,7 @@
 """How fast this machine is, in under a minute: the arm in many variants by `run_batch`, and a few of them by scipy's LSODA.
 
 Both integrate the same trajectories: the arm lifted from rest by a constant voltage for 10 s, voltage and payload from a
-box in which it meets no stop. LSODA has the explicit equations (`explicit_arm`) and the loosest tolerance at which the
+box in which it meets no stop. LSODA has the explicit equations (`benchmark_arm`) and the loosest tolerance at which the
 angle is right to 0.05 degrees on this problem. The whole comparison, with exact solutions, diffrax and C++, is
 `python -m studies.benchmarks.run` of the repository.
 """
@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from smajax.cli import explicit_arm
+from smajax.cli import benchmark_arm
 from smajax.core.machine import machine
 from smajax.core.operating_system import available_cores
 from smajax.core.parameters import parameter_values
@@ -35,11 +35,11 @@ def _lsoda(p: dict[str, float], voltage: float, payload: float, at: np.ndarray) 
     """Angle (degrees) at the times `at` of one member."""
     from scipy.integrate import solve_ivp
 
-    def slope(_: float, state: np.ndarray) -> explicit_arm.State:
+    def slope(_: float, state: np.ndarray) -> benchmark_arm.State:
         a, b, c, d, e = state.tolist()
-        return explicit_arm.rates(explicit_arm.Floats, p, voltage, payload, (a, b, c, d, e))
+        return benchmark_arm.rates(benchmark_arm.Floats, p, voltage, payload, (a, b, c, d, e))
 
-    first = explicit_arm.start(explicit_arm.Floats, p, payload)
+    first = benchmark_arm.start(benchmark_arm.Floats, p, payload)
     result = solve_ivp(slope, (0.0, SECONDS), first, "LSODA", t_eval=at, rtol=LSODA_TOLERANCE, atol=LSODA_TOLERANCE)
     return np.degrees(result.y[2])
 

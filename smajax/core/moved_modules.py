@@ -78,7 +78,7 @@ MODULES = {
     "experiment.own_columns": "data.experiment.column_overrides",
     "experiment.readings": "data.experiment.reading_limits",
     "experiment.template": "data.experiment.draft",
-    "explicit_arm": "cli.explicit_arm",
+    "explicit_arm": "cli.benchmark_arm",
     "extended": "fit.base_model",
     "fit.batch": "fit.packed_runs",
     "fit.box": "fit.levenberg_marquardt",

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from smajax.cli import explicit_arm as equations
+from smajax.cli import benchmark_arm as equations
 from studies.benchmarks.given import Given, load
 from studies.benchmarks.timed import timed
 

@@ -13,7 +13,7 @@ import numpy as np
 class Given:
     """Members and constants of a problem, and the exact solution of the first members.
 
-    `said` is the problem in words that a file can be told by: constants (`smajax.cli.explicit_arm`), seconds and limits.
+    `said` is the problem in words that a file can be told by: constants (`smajax.cli.benchmark_arm`), seconds and limits.
     """
 
     said: str

@@ -12,7 +12,7 @@ from pathlib import Path
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.cli import explicit_arm as equations
+from smajax.cli import benchmark_arm as equations
 from smajax.core.parameters import parameter_values
 from smajax.model.rigs import arm
 from smajax.simulation.batch.axes import Axes, sampled
@@ -94,7 +94,7 @@ def _reference(p: dict[str, float], payload_mass: float) -> ArmParameters:
 
 
 def _solved(p: dict[str, float], voltage: float, payload_mass: float) -> tuple[np.ndarray, np.ndarray]:
-    """(angle in degrees, fraction) of one member; ValueError where it does what `smajax.cli.explicit_arm` leaves out."""
+    """(angle in degrees, fraction) of one member; ValueError where it does what `smajax.cli.benchmark_arm` leaves out."""
     times = np.arange(CLOSE * round(SECONDS / EVERY) + 1) * (EVERY / CLOSE)
     run = simulate_arm(_reference(p, payload_mass), [(SECONDS, voltage)], times, rtol=RTOL)
     angle, xi, stress = run["angle"], run["martensite_fraction"], run["stress"]

@@ -13,7 +13,7 @@ import numpy as np
 import scipy
 from scipy.integrate import solve_ivp
 
-from smajax.cli import explicit_arm as equations
+from smajax.cli import benchmark_arm as equations
 from studies.benchmarks.given import Given, load
 
 TOLERANCES = (1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 3e-7, 1e-7, 1e-8)  # relative and absolute

@@ -2,7 +2,7 @@ r"""What is differentiated beside others: a cost of tracking by all parameters o
 
 $J = \frac{1}{T} \int_0^T [(\theta - \theta_d)/s]^2 dt$ of the arm lifted by a constant voltage, with $\theta_d$ a ramp from its rest
 to `ENDS_AT` and $s$ `SCALE`; smajax takes the mean over the ends of its steps. For the peers J is a sixth state of
-`smajax.cli.explicit_arm`. Those equations know no `start_fraction`, for they begin in martensite: a slope by it is not compared.
+`smajax.cli.benchmark_arm`. Those equations know no `start_fraction`, for they begin in martensite: a slope by it is not compared.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from smajax.cli import explicit_arm as equations
+from smajax.cli import benchmark_arm as equations
 
 SECONDS = 10.0
 ENDS_AT, SCALE = 0.5, 0.1  # rad
@@ -28,7 +28,7 @@ DIFFERENCE = 1e-4  # of a parameter, to either side
 RTOL = 1e-9
 REPEATS = 10  # of everything that is timed here: a tenth of a second each, and of two of them a ratio is taken
 
-State = tuple[Any, ...]  # of `smajax.cli.explicit_arm`, and the cost so far
+State = tuple[Any, ...]  # of `smajax.cli.benchmark_arm`, and the cost so far
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from smajax.cli import explicit_arm as equations
+from smajax.cli import benchmark_arm as equations
 from smajax.core.parameters import set_parameters
 from smajax.model.rigs import arm
 from smajax.simulation.simulate import simulate
