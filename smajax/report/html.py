@@ -275,7 +275,7 @@ def findings_to_html(findings: Findings, narrative: Narrative | None = None, ste
     first, correlation_of = run_plots.first_plot(findings), run_plots.residual_correlation(findings)
     return (
         environment()
-        .get_template("close_loop.html")
+        .get_template("findings.html")
         .render(
             **parts_of_frame(True),
             contents=_contents(findings, steps),
