@@ -74,7 +74,10 @@ class Observed(NamedTuple):
 
 
 class AbstractObserver(eqx.Module):
-    """What is made of a run while it goes on. Whatever is not overridden does nothing; no observers at all is `()`."""
+    """What is made of a run while it goes on. Whatever is not overridden does nothing; no observers at all is `()`.
+
+    Observers record: none estimates a state from readings, as the observers of control theory do (`smajax.control.estimators`).
+    """
 
     per_period: ClassVar[bool] = False  # `sample` is called once a `Period`, otherwise once a `Step`
 

@@ -1,4 +1,7 @@
-"""Observers of a run (`integrate`): traces of its states, measures, and whether it went wrong."""
+"""Observers of a run (`integrate`): traces of its states, measures, and whether it went wrong.
+
+They record and are no state estimators, which are in `smajax.control.estimators`.
+"""
 
 from __future__ import annotations
 
