@@ -1,4 +1,4 @@
-"""What the loop takes as known: parameters that neither a fit nor a log gives."""
+"""What `close-loop` takes as known: parameters that neither a fit nor a log gives."""
 
 from __future__ import annotations
 

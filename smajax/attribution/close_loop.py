@@ -57,12 +57,12 @@ EVERY, RARELY = 60.0, 8.0  # s before the first page of a search that goes on; t
 CHECKING, WRITING = "checking what these runs determine", "standard errors and pictures"
 
 
-Interim = Callable[[Findings], object]  # gets what is known of a loop that goes on
+Interim = Callable[[Findings], object]  # gets what is known of an attribution that goes on
 
 
 @dataclass(frozen=True)
 class Context:
-    """What every stage of one loop shares; `setting` collects the rounds and the evidence."""
+    """What every stage of one attribution shares; `setting` collects the rounds and the evidence."""
 
     job: Job
     setting: Search
@@ -104,7 +104,7 @@ def close_loop(  # keywords, which a caller names one by one
 ) -> Findings:
     """Fit the base model, look at what it leaves, find what it lacks, and validate on runs the fit never saw.
 
-    `memory` is a folder for finished fits: a loop that was interrupted resumes from there.
+    `memory` is a folder for finished fits: an attribution that was interrupted resumes from there.
     Held-out runs are simulated when the search is over: they reject what they do not validate, and nothing is added
     for them. The caller chooses precision; anything but float64 is refused with a ValueError, because the
     differences that decide here are far below float32's rounding over a run. `interim` gets what is known after the base fit, in a long search
@@ -298,7 +298,7 @@ def unknown_terms_of(context: Context, outcome: Outcome, verdict: Verdict) -> tu
 
 
 def known_so_far(context: Context, models: tuple[JointSearch, Model, Model], remaining: Remaining) -> Findings:
-    """What a loop that goes on knows by then, as findings without a verdict. `models`: the search, base model, likeliest model."""
+    """What an attribution that goes on knows by then, as findings without a verdict. `models`: the search, base model, likeliest model."""
     search, base, final = models
     compared = compare(context.job, context.setting, base, final)
     found = findings_of(context, Outcome(search, base, final, Lacking()), compared, brief=True)

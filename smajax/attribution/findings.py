@@ -1,4 +1,4 @@
-"""What one closed loop found: numbers and enums, which `smajax.report.narrative` puts into words.
+"""What `close-loop` found: numbers and enums, which `smajax.report.narrative` puts into words.
 
 Arrays are numpy, SI, temperatures in degrees Celsius, angles in radians; nothing in here simulates or fits.
 """
@@ -36,11 +36,11 @@ class Verdict(StrEnum):
     EXPLAINED = "explained"
     PARTLY_EXPLAINED = "partly explained"
     NOT_IN_LIBRARY = "not in the library"
-    NOT_FINISHED = "not finished"  # of a loop that goes on, or was ended before its end
+    NOT_FINISHED = "not finished"  # of an attribution that goes on, or was ended before its end
 
 
 class Remaining(StrEnum):
-    """What a loop that goes on has still to do."""
+    """What an attribution that goes on has still to do."""
 
     NOTHING = ""
     SEARCH = "the search for effects, and the checks of what it finds"
@@ -313,7 +313,7 @@ class Findings:
     base_model: ActuatorModel | None = None  # as they are saved
     extended_model: ActuatorModel | None = None
     effects_excluded: int = 0  # effects that this model can show and the experiment file keeps from being candidates
-    remaining: Remaining = Remaining.NOTHING  # of what is known while a loop goes on
+    remaining: Remaining = Remaining.NOTHING  # of what is known while the attribution goes on
 
     @property
     def integration_error(self) -> float:

@@ -1,4 +1,7 @@
-"""Runs that no fit saw: simulated when the search is over, no effect is added for them, and they reject what they do not validate."""
+"""Runs that no fit saw: simulated when the search is over, no effect is added for them, and they reject what they do not validate.
+
+The bands about their predictions are made in `averaged_prediction`.
+"""
 
 from __future__ import annotations
 

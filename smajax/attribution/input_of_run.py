@@ -3,7 +3,7 @@
 Each is an effect of the library with a value of that run alone, and an event with the prior odds of one, shared among the runs. It
 is fitted together with all parameters of the base model and of the likeliest model, in the runs that these leave most of, and
 compared by its evidence as sets of effects are. Asked only where something is missing. Where one is likelier, and explains what was
-missing, the loop goes on with the run corrected by it (`corrected`): what the search named in its place was a stand-in.
+missing, `close-loop` goes on with the run corrected by it (`corrected`): what the search named in its place was a stand-in.
 
 A model that leaves far more than noise lacks something else as well, and an error of a record is the first thing to take a part of it
 over: on a bench of which the best model leaves 12 noises, a clock that was half a second late at its end in one run was

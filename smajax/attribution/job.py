@@ -1,4 +1,4 @@
-"""What every stage of one loop shares."""
+"""What every stage of one attribution shares."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from smajax.simulation.steppers import Integration
 
 @dataclass(frozen=True)
 class Job:
-    """What every stage of one loop shares."""
+    """What every stage of one attribution shares."""
 
     experiment: Experiment
     fit_runs: tuple[Run, ...]

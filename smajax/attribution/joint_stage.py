@@ -1,4 +1,4 @@
-"""The joint search as a stage of the loop: it takes the base fit, and gives the models that the later stages take.
+"""The joint search as a stage of `close-loop`: it takes the base fit, and gives the models that the later stages take.
 
 Effects whose gain is gone at half the step of the integration are excluded and the search is made again without them.
 """

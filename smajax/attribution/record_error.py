@@ -1,4 +1,4 @@
-"""What the loop finds of single runs: an input that was recorded wrongly, and a run that does not agree with the others."""
+"""What `close-loop` finds of single runs: an input that was recorded wrongly, and a run that does not agree with the others."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class RecordError:
-    """An input of one run that was recorded wrongly, and by how much; the loop went on with the run so corrected."""
+    """An input of one run that was recorded wrongly, and by how much; `close-loop` went on with the run so corrected."""
 
     run: str
     channel: str  # of the run's inputs, or "load" where no input gives it

@@ -1,4 +1,4 @@
-"""The models that a closed loop ends with, as they are saved: base and extended, with all that is likely beside the latter."""
+"""The models that `close-loop` ends with, as they are saved: base and extended, with all that is likely beside the latter."""
 
 from __future__ import annotations
 

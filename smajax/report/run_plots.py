@@ -1,4 +1,4 @@
-"""Plots of the runs of a loop: output, residual and inputs over time, and the residual's autocorrelation."""
+"""Plots of the runs of an attribution: output, residual and inputs over time, and the residual's autocorrelation."""
 
 from __future__ import annotations
 
