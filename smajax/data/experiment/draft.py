@@ -21,6 +21,7 @@ from smajax.data.experiment.column_guess import (
     time_unit_of,
     times_not_read,
 )
+from smajax.data.experiment.draft_channels import channel_lines, override_lines
 from smajax.data.experiment.draft_facts import BenchFacts, Known, facts_of
 from smajax.data.experiment.draft_model import DraftModel, ModelChoice, choose_model
 from smajax.data.experiment.draft_parameters import PresetLine, kept_parameters, ordered, preset_parameters
@@ -52,39 +53,6 @@ class Draft:
     def in_order(self, remarks: Mapping[str, str]) -> Draft:
         """With the values that are the preset's in the order of `remarks`, by name, each with its own beside it."""
         return replace(self, text=ordered(self.text, self.presets, remarks))
-
-
-def _key(column: Column, variable: bool) -> str:
-    word = "variable" if variable else "column"
-    return f"{word} = {toml_value(column.key)}"
-
-
-def _channel(name: str, role: str, column: Column, variable: bool, off: bool) -> list[str]:
-    lines = [
-        f"[channels.{name}]  # {column.sure}: {column.why}",
-        f'role = "{role}"',
-        _key(column, variable),
-        f"unit = {toml_value(column.unit)}",
-    ]
-    if role == "output":
-        lines.append('noise = "estimate"  # or its sigma, such as "0.01 mm"')
-        lines += [] if off else ["# reversed = true  # where the sensor counts the other way: down when the wire pulls"]
-    return [f"# {line}" if off else line for line in lines]
-
-
-def _override_lines(overrides: Mapping[str, Column], usual: Mapping[str, Column]) -> list[str]:
-    """Columns and units of a run whose log has other names for them."""
-    if not overrides:
-        return []
-    columns = ", ".join(f"{name} = {toml_value(one.key)}" for name, one in overrides.items())
-    units = ", ".join(
-        f"{name} = {toml_value(one.unit)}" for name, one in overrides.items() if one.unit != usual[name].unit
-    )
-    sure = max((one.sure for one in overrides.values()), key=[SURE, LIKELY, GUESS].index)
-    return [
-        f"columns = {{ {columns} }}  # {sure}: this log has other names for them",
-        *([f"units = {{ {units} }}"] if units else []),
-    ]
 
 
 def _round(step: float) -> float:
@@ -127,7 +95,7 @@ def draft(
     kept = None if choice.model is None else load_model(choice.model)
     if kept is not None:
         choice = replace(choice, load=kept.load, wire=kept.wire, drive=kept.drive)
-    tables = [read_table(file, decimal=decimal or None) for file in files]
+    tables = [read_table(file, decimal=decimal or None).with_gaps() for file in files]
     logs = logs_of(files, tables, columns)
     by_quantity = {one.quantity: one for one, _ in logs.columns if one.quantity}
     kind_of = {one.quantity: kind for one, kind in logs.columns if one.quantity}
@@ -169,6 +137,14 @@ class _Inputs:
     def is_variable(self, quantity: str) -> bool:
         """Whether a file names it a variable: a signal with its own times."""
         return bool(self.logs.kinds[self.kind_of[quantity]].clocks)
+
+    def has_gaps(self, quantity: str) -> bool:
+        """Whether any log lacks samples of it."""
+        files = [run.files[self.kind_of[quantity]] for run in self.logs.runs]
+        return any(
+            self.tables[self.files.index(file)].has_gaps(self.overrides(file).get(quantity, self.columns[quantity]).key)
+            for file in files
+        )
 
     @property
     def first_forces(self) -> Mapping[str, float]:
@@ -323,7 +299,14 @@ def _channels(inputs: _Inputs) -> _Section:
     messages: list[str] = []
     for name, role in roles.items():
         if name in columns:
-            lines += [*_channel(name, role, columns[name], inputs.is_variable(name), False), ""]
+            gaps = inputs.has_gaps(name)
+            lines += [*channel_lines(name, role, columns[name], inputs.is_variable(name), False, gaps), ""]
+            if gaps and role == "input":
+                messages.append(
+                    f"{name}: some of its cells are empty, and the model needs every sample of an input: fill them"
+                )
+            elif gaps:
+                messages.append(f'{name}: some of its cells are empty: these samples are omitted (missing = "skip")')
     for name, role in roles.items():
         if name not in columns:
             lines += [
@@ -341,7 +324,9 @@ def _channels(inputs: _Inputs) -> _Section:
             role = "output" if one.quantity in sensors else "input"
             lines += [
                 f"# {'A further output, where it is of this wire' if role == 'output' else 'Not used by this model'}: {one.name}",
-                *_channel(one.quantity, role, one, inputs.is_variable(one.quantity), True),
+                *channel_lines(
+                    one.quantity, role, one, inputs.is_variable(one.quantity), True, inputs.has_gaps(one.quantity)
+                ),
                 "",
             ]
     return _Section(lines, messages)
@@ -384,7 +369,7 @@ def _runs(inputs: _Inputs, target: Path) -> _Section:
             ),
             *([f"inputs = {{ mass = {toml_value(masses[run.name])} }}"] if masses else []),
             f"file = {names[0]}" if len(names) == 1 else f"files = {{ {by_channel} }}",
-            *_override_lines(
+            *override_lines(
                 {name: one for name, one in overrides.items() if name in {TIME, *channels}}, inputs.columns
             ),
             "",

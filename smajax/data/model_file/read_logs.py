@@ -119,5 +119,5 @@ def _experiment(
         data=DataSection(folder=".", decimal=decimal or log_format.decimal),  # type: ignore[arg-type]
         runs=list(runs),
     )
-    # The folder of the logs stands for that of an experiment file.
-    return experiment_of(folder / "model.toml", file, CATALOGUE)
+    # The folder of the logs stands for that of an experiment file, and errors name the first log.
+    return experiment_of(folder / Path(str(runs[0].file)).name, file, CATALOGUE)

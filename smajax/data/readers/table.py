@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -92,6 +92,11 @@ class Table:
                 f"{values[bad[0]]} in {self.place(int(bad[0]))}; remove or repair those samples"
             )
         return values
+
+    def with_gaps(self) -> Table:
+        """The table in which columns that only lack some samples are columns, with nan there."""
+        held = {name: why for name, why in self.unusable.items() if name not in self.gappy}
+        return replace(self, columns={**self.columns, **self.gappy}, unusable=held, gappy={})
 
     def has_gaps(self, key: str | int) -> bool:
         """Whether the column holds a signal once cells that are empty or nan are taken as missing samples."""

@@ -1,0 +1,43 @@
+"""The lines of a draft that name a channel: its column, its role and its unit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from smajax.data.experiment.column_guess import GUESS, LIKELY, SURE, Column
+from smajax.data.experiment.toml_file import toml_value
+
+
+def _key(column: Column, variable: bool) -> str:
+    word = "variable" if variable else "column"
+    return f"{word} = {toml_value(column.key)}"
+
+
+def channel_lines(name: str, role: str, column: Column, variable: bool, off: bool, gaps: bool) -> list[str]:
+    """A section of a channel, as comments where it is `off`. gaps: whether samples are missing, which an output may lack."""
+    lines = [
+        f"[channels.{name}]  # {column.sure}: {column.why}",
+        f'role = "{role}"',
+        _key(column, variable),
+        f"unit = {toml_value(column.unit)}",
+    ]
+    if role == "output":
+        lines += ['missing = "skip"  # empty cells are omitted'] if gaps else []
+        lines.append('noise = "estimate"  # or its sigma, such as "0.01 mm"')
+        lines += [] if off else ["# reversed = true  # where the sensor counts the other way: down when the wire pulls"]
+    return [f"# {line}" if off else line for line in lines]
+
+
+def override_lines(overrides: Mapping[str, Column], usual: Mapping[str, Column]) -> list[str]:
+    """Columns and units of a run whose log has other names for them."""
+    if not overrides:
+        return []
+    columns = ", ".join(f"{name} = {toml_value(one.key)}" for name, one in overrides.items())
+    units = ", ".join(
+        f"{name} = {toml_value(one.unit)}" for name, one in overrides.items() if one.unit != usual[name].unit
+    )
+    sure = max((one.sure for one in overrides.values()), key=[SURE, LIKELY, GUESS].index)
+    return [
+        f"columns = {{ {columns} }}  # {sure}: this log has other names for them",
+        *([f"units = {{ {units} }}"] if units else []),
+    ]
