@@ -23,7 +23,7 @@ from smajax.report.sweep_numbers import digest_of, plain
 from studies.disturbances.loops import events_of, plants, positions
 from studies.disturbances.scenarios import HELD, SECONDS, STEP, Scenario, scenarios
 from studies.marked import put
-from studies.requirement.run import gains_of
+from studies.requirement.run import COMPARED, gains_of
 
 HERE = Path(__file__).parent
 DRAWN_EVERY = 20  # samples
@@ -96,7 +96,7 @@ def main(arguments: list[str]) -> None:
     happenings, ratios = scenarios(), plants(corners="--fast" not in arguments)
     results: dict[str, Any] = {"controllers": {}, "plants": ratios.tolist()}
     drawn: dict[str, dict[str, np.ndarray]] = {name: {} for name in happenings}
-    for name in names or CONTROLLERS:
+    for name in names or COMPARED:
         angles = positions(name, list(happenings.values()), ratios)
         found = {key: judged(one, each) for (key, one), each in zip(happenings.items(), angles, strict=True)}
         results["controllers"][name] = {"gains": gains_of(name)[1], **found}

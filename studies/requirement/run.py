@@ -40,6 +40,11 @@ from studies.requirement.search import (
     searched,
 )
 
+# The controllers that this study, `studies.sweep` and `studies.disturbances` compare: one that is added here is run by all three.
+COMPARED = (
+    *("pid", "vsc1", "vsc2", "vsc3", "nvsc", "sld", "backstepping1", "backstepping2"),
+    *("backstepping1_integral", "backstepping2_integral", "feedforward_pi", "receding_horizon"),
+)
 HERE = Path(__file__).parent
 GAINS = HERE / "gains"
 QUICKEST = "backstepping1_integral"
@@ -211,7 +216,7 @@ def main(arguments: list[str]) -> None:
     rows, system = judged_on(), arm()
     between, nominal = (interface_of(system, one, NOISE, PERIOD, STEP, DELAY, QUANTUM) for one in (FILTER, NOMINAL))
     results = json.loads((HERE / "results.json").read_text(encoding="utf-8")) if named else {}
-    for name in named or CONTROLLERS:
+    for name in named or COMPARED:
         gains, origin = gains_of(name)
         one: dict[str, Any] = {
             "gains": origin,
@@ -234,7 +239,7 @@ def main(arguments: list[str]) -> None:
 def _judge_afresh(names: list[str], seed: int) -> None:
     """Print what the gains do on `FRESH` other plants, drawn with `seed`; nothing is written."""
     rows, between = drawn(FRESH, seed), interface_of(arm(), FILTER, NOISE, PERIOD, STEP, DELAY, QUANTUM)
-    for name in names or CONTROLLERS:
+    for name in names or COMPARED:
         one = judged(name, between, rows, gains_of(name)[0])
         print(f"{name}: {_met(one)} of {one['loops']} loops, beyond the limits {one['beyond']}", flush=True)
 

@@ -20,7 +20,7 @@ from smajax.core.runtime import prepare
 from smajax.model.rigs import arm
 from smajax.report.sweep_folder import as_text, write_sweep
 from smajax.report.sweep_page import answer
-from studies.requirement.run import GAINS
+from studies.requirement.run import COMPARED, GAINS
 
 HERE = Path(__file__).parent
 COMMAND = "python -m studies.sweep.run"
@@ -38,7 +38,7 @@ def settings_of(folder: str, **changed: Any) -> SweepSettings:
     """Of one of `SWEEPS`; changed: further fields."""
     system = arm()
     tuned = tuple(read_gains(path, system) for path in sorted(GAINS.glob("*.json")))
-    return sweep_settings_for(system, tuned=tuned, **{**SWEEPS[folder], **changed})
+    return sweep_settings_for(system, COMPARED, tuned=tuned, **{**SWEEPS[folder], **changed})
 
 
 def _said(event: Event) -> None:

@@ -11,13 +11,14 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
-from smajax.control.presets import CONTROLLERS
+from smajax.control.presets import CONTROLLERS, OF_THE_SOURCE
 from smajax.core.parameters import get_parameters
 from smajax.model.rigs import arm
 from smajax.report.sweep_numbers import IN_PICTURE
 from studies.disturbances.loops import events_of, plants, positions
 from studies.disturbances.run import COLUMNS, DRAWN_EVERY, FIGURES, HERE, draw, judged, table
 from studies.disturbances.scenarios import COLDER, EVENTS, HELD, STEP, Scenario, scenarios
+from studies.requirement.run import COMPARED
 
 RESULTS: dict[str, Any] = json.loads((HERE / "results.json").read_text(encoding="utf-8"))
 PAGE = (HERE / "README.md").read_text(encoding="utf-8")
@@ -28,7 +29,8 @@ HOLDING = ("backstepping1_integral", "feedforward_pi", "nvsc", "receding_horizon
 
 
 def test_the_tables_and_pictures_are_of_the_stored_numbers() -> None:
-    assert set(RESULTS["controllers"]) == set(CONTROLLERS)
+    assert list(RESULTS["controllers"]) == list(COMPARED)
+    assert set(OF_THE_SOURCE) < set(COMPARED) <= set(CONTROLLERS)
     np.testing.assert_allclose(RESULTS["plants"], plants())
     for name in EVERY:
         assert PAGE.split(f"<!-- {name} -->")[1].strip() == table(RESULTS, name)
@@ -56,7 +58,7 @@ def test_what_the_page_says_of_the_controllers_is_what_is_stored() -> None:
 @pytest.mark.parametrize("count", [10, 11, 12])
 def test_the_lowest_panel_of_each_column_has_the_times_below_it(count: int) -> None:
     """Also where the last row is not full."""
-    angles = {name: np.zeros((1, len(EVERY["payload"].wanted)))[:, ::DRAWN_EVERY] for name in list(CONTROLLERS)[:count]}
+    angles = {name: np.zeros((1, len(EVERY["payload"].wanted)))[:, ::DRAWN_EVERY] for name in COMPARED[:count]}
     figure = Figure(figsize=(11.0, 10.0))
     draw(figure, EVERY["payload"], angles)
     FigureCanvasAgg(figure).draw()

@@ -11,13 +11,14 @@ import pytest
 from smajax.control.estimators.adaptive_filter import AdaptiveFilter
 from smajax.control.gains_file import read_gains
 from smajax.control.least_time import least_reach_times
-from smajax.control.presets import CONTROLLERS, with_printed_law
+from smajax.control.presets import CONTROLLERS, OF_THE_SOURCE, with_printed_law
 from smajax.control.signal_path import interface_of
 from smajax.control.sweep.batched_loops import LoopSetup, closed_loops
 from smajax.control.sweep.grid import loop_rows
 from smajax.control.tune.terms import TERMS
 from smajax.model.rigs import arm
 from studies.requirement.run import (
+    COMPARED,
     FRONTIER,
     FRONTIER_MARK,
     GAINS,
@@ -87,7 +88,8 @@ def test_the_limit_of_the_command_is_searched_up_to_the_drives() -> None:
 def test_the_stored_results_are_of_every_controller_and_in_the_table() -> None:
     whole = json.loads((HERE / "results.json").read_text(encoding="utf-8"))
     results, page = whole["controllers"], (HERE / "README.md").read_text(encoding="utf-8")
-    assert set(results) == set(CONTROLLERS)
+    assert list(results) == list(COMPARED)
+    assert set(OF_THE_SOURCE) < set(COMPARED) <= set(CONTROLLERS)
     assert {name for name, one in results.items() if one["gains"] != "preset"} == {
         path.stem for path in GAINS.glob("*.json")
     }
