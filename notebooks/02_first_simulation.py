@@ -1,7 +1,8 @@
 # %% [markdown]
 # # First simulation
 #
-# An arm on a wire, a step of voltage, and the states of the wire: wire x load x drive, by name.
+# An arm on a wire, a step of voltage, and the states of the wire: wire x load x drive, by name. `sma.WIRES`, `sma.LOADS` and `sma.DRIVES` have the
+# presets, and `smajax presets` lists them.
 
 # %% tags=["skip-execution"]
 # %pip install -q smajax
@@ -14,9 +15,8 @@ import smajax as sma
 
 sma.prepare()  # float64, and compiled programs are kept for the next time
 
-print("wires: ", ", ".join(sma.WIRES))
-print("loads: ", ", ".join(sma.LOADS))
-print("drives:", ", ".join(sma.DRIVES))
+for preset in (sma.WIRES["niti_table_3_1"], sma.LOADS["arm"], sma.DRIVES["amplified_voltage"]):
+    print(f"{preset.__name__}: {preset.__doc__.splitlines()[0]}")
 
 # %% [markdown]
 # The source's rotary arm. Every parameter has a unit, bounds and a meaning, and may be changed by name.
