@@ -19,7 +19,6 @@ from PIL import Image
 from smajax.core.display_units import axis_label, display
 from smajax.core.files import replace
 from smajax.core.progress import Progress, Stage, quiet
-from smajax.model.load.arm import Arm
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System
 from smajax.model.types import Series, Trajectory
@@ -98,7 +97,8 @@ def moving(
     figure = Figure(figsize=UPRIGHT if upright else SIZE, dpi=DPI, layout="constrained")
     canvas = FigureCanvasAgg(figure)
     load, plane = figure.subplots(2, 1) if upright else figure.subplots(1, 2, width_ratios=[1.0, 1.25])
-    draws = [(_arm if isinstance(system.load, Arm) else _slider)(load, system, run), _plane(plane, system, run)]
+    drawn = _arm if system.load.position_unit == "rad" else _slider
+    draws = [drawn(load, system, run), _plane(plane, system, run)]
     canvas.draw()
     images = []
     background = canvas.copy_from_bbox(figure.bbox)
@@ -141,18 +141,16 @@ def _gif(images: list[Image.Image], each: int) -> bytes:
 
 
 def _arm(axes: Axes, system: System, run: Run) -> Draw:
-    """The link on its pulley, seen from the side."""
-    load = system.load
-    assert isinstance(load, Arm)
+    """The link on its pulley, seen from the side; of any load that turns."""
     angle = np.asarray(run.position)
-    for stop in (float(load.lower_stop), float(load.upper_stop)):
+    for stop in filter(np.isfinite, map(float, system.load.limits())):
         axes.plot([0.0, 1.15 * np.cos(stop)], [0.0, 1.15 * np.sin(stop)], ":", color=QUIET, linewidth=0.9)
     axes.plot(np.cos(angle), np.sin(angle), color="#eceef1", linewidth=6.0, solid_capstyle="round", zorder=0)
     (link,) = axes.plot([], [], color=MEASURED, linewidth=4.0, solid_capstyle="round", animated=True)
     (payload,) = axes.plot([], [], "o", color=MEASURED, markersize=15.0, animated=True)
     (pulley,) = axes.plot([0.0], [0.0], "o", markersize=24.0, animated=True)
     words = axes.text(0.02, 0.98, "", transform=axes.transAxes, va="top", fontsize=10, animated=True)
-    axes.set(xlim=(-0.5, 1.35), ylim=(-1.15, 1.3), aspect="equal")
+    axes.set(xlim=(min(-0.5, float(np.cos(angle).min()) - 0.35), 1.35), ylim=(-1.15, 1.3), aspect="equal")
     axes.axis("off")
 
     def draw(at: int) -> list[Any]:

@@ -18,13 +18,13 @@ from smajax.control.run_result import RunResult
 from smajax.control.scales import seconds_for
 from smajax.core.display_units import digits
 from smajax.core.operating_system import as_typed
+from smajax.data.experiment.draft_model import GUESSED, loads_with
 from smajax.data.model_file.actuator_model import ActuatorModel
 from smajax.fit.identify_result import Identified
 from smajax.model.system import System
 
 RUN = "another_run.csv"
 RUNS = ("first_run.csv", "second_run.csv", "third_run.csv")
-DRAFTED = ("dead_weight", "bias_spring", "blocked_wire")  # loads that `new-experiment` takes
 MODEL = "model.toml"
 PREFERRED = "pid"  # where the load can have it
 MOVED = 0.02  # of the stroke: a run that moved the load by less says no set point
@@ -67,10 +67,13 @@ class PlantWords:
         return [*self.assumed(), *(("--plant", self.other) if self.other else ())]
 
     def of_experiment(self) -> list[str]:
-        """Options of new-experiment, which takes some loads only."""
+        """Options of new-experiment, which takes no coupon; the arm is what it guesses of an angle."""
         if self.model:
             return ["--model", self.model]
-        return self.assumed() if self.parts and self.parts[1] in DRAFTED and not (self.law or self.values) else []
+        if not self.parts or self.law or self.values:
+            return []
+        guessed = self.parts[1] == GUESSED["angle"][0]
+        return [] if guessed or not any(self.parts[1] in loads_with(one) for one in GUESSED) else self.assumed()
 
     def _rest(self) -> list[str]:
         law = ("--law", self.law) if self.law else ()

@@ -1,4 +1,4 @@
-"""Loads of a user's own: a lever with a stiffening spring, and one that asks for an input."""
+"""Loads of a user's own: a lever with a stiffening spring, one that turns, and one that asks for an input."""
 
 from __future__ import annotations
 
@@ -40,6 +40,18 @@ class Lever(AbstractMovingLoad):
 
     def contraction(self, wire):
         return 1.0 / (self.ratio * wire.wire_length)
+
+
+class Crank(Lever):
+    """The same on a drum of 20 mm, read as an angle."""
+
+    reading: ClassVar[tuple[str, str]] = ("angle", "rad")
+
+    def lever(self):
+        return 0.02
+
+    def contraction(self, wire):
+        return 0.02 / wire.wire_length
 
 
 class Scheduled(Lever):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import jax
@@ -15,8 +16,9 @@ from smajax.core.progress import Event, Stage
 from smajax.model.presets import build
 from smajax.model.types import Trajectory
 from smajax.model.wire.kinetics import heating_temperature
-from smajax.report.animation import _slider, animate, animate_run, moving, ranges
+from smajax.report.animation import _arm, _slider, animate, animate_run, moving, ranges
 from smajax.simulation.compiled import simulate_compiled
+from tests.helpers.own_load import Crank
 
 ARM = build("niti_table_3_1", "arm", "amplified_voltage")
 PULSE = {"voltage": jnp.where(jnp.arange(801) < 400, 8.0, 0.0)}  # V, 10 ms apart
@@ -83,6 +85,20 @@ def test_the_animation_of_a_weight_is_drawn(tmp_path: Path) -> None:
     pictures = frames(path)
     assert len(pictures) == 4
     assert np.abs(pictures[-1] - pictures[0]).max() > 50.0
+
+
+def test_any_load_that_turns_is_drawn_as_a_lever(tmp_path: Path) -> None:
+    system = dataclasses.replace(build("flexinol_table_3_2", "dead_weight", "flexinol_voltage"), load=Crank())
+    run = simulate_compiled(system, {"voltage": jnp.full(401, 5.5)}, 0.02)
+    pictures = frames(animate(system, run, tmp_path / "crank.gif", frames=4))
+    half = pictures[0].shape[1] // 2
+    assert np.abs(pictures[-1][:, :half] - pictures[0][:, :half]).max() > 50.0
+    axes = Figure().subplots()
+    link, *_, words = _arm(axes, system, run)(400)
+    angle = float(run.position[-1])
+    np.testing.assert_allclose(link.get_xydata()[1], [np.cos(angle), np.sin(angle)], rtol=1e-6)
+    assert f"{np.degrees(angle):.0f}°" in words.get_text()
+    assert not [line for line in axes.lines if line.get_linestyle() == ":"], "it has no end stops"
 
 
 def test_the_animation_of_a_blocked_wire_shows_its_force_and_not_the_micrometres_that_it_moves(tmp_path: Path) -> None:

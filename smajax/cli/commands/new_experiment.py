@@ -30,7 +30,8 @@ def new_experiment(
     load: Annotated[
         str,
         typer.Option(
-            help="of a log with a position: dead_weight (default) or bias_spring; with a force: blocked_wire",
+            help="of `smajax presets`, with a reading that the logs have; default: of a position dead_weight, of a force blocked_wire, "
+            "of an angle arm",
             autocompletion=completion.loads,
         ),
     ] = "",

@@ -8,20 +8,24 @@ from pathlib import Path
 from types import MappingProxyType
 
 from smajax.core.names import close_matches
+from smajax.core.plugins import PluginError
 from smajax.core.wording import and_listed
 from smajax.data.experiment.column_guess import COUPON, DRIVES, GUESS, Column
 from smajax.data.model_catalogue import check_together
 from smajax.data.readers.table import MeasuredDataError
+from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.presets import DRIVES as DRIVE_PRESETS
-from smajax.model.presets import WIRES, build
+from smajax.model.presets import LOADS, WIRES, build, made_load
 
-# Reading -> the loads that have it, and the wire of a bench with one.
-WITH_READING: Mapping[str, Mapping[str, str]] = MappingProxyType(
+# Reading -> the load that is guessed of it, and the wire of a bench with that load or another of the same reading.
+GUESSED: Mapping[str, tuple[str, str]] = MappingProxyType(
     {
-        "position": {"dead_weight": "flexinol_table_3_2", "bias_spring": "flexinol_ht_500um"},
-        "force": {"blocked_wire": "flexinol_table_3_2"},
+        "position": ("dead_weight", "flexinol_table_3_2"),
+        "force": ("blocked_wire", "flexinol_table_3_2"),
+        "angle": ("arm", "niti_table_3_1"),
     }
 )
+OTHER_WIRE: Mapping[str, str] = MappingProxyType({"bias_spring": "flexinol_ht_500um"})  # load -> wire
 
 
 @dataclass(frozen=True)
@@ -77,16 +81,32 @@ def _with_load(columns: Mapping[str, Column], load: str) -> DraftModel:
     guessed = _guessed(columns)
     if load in ("", guessed.load):
         return guessed
-    readings = [guessed.output, *(name for name in WITH_READING if name in columns and name != guessed.output)]
-    wires = {one: (wire, name) for name in readings for one, wire in WITH_READING.get(name, {}).items()}
-    if load not in wires:
-        fitting = list(wires) or [guessed.load]
+    readings = [guessed.output, *(name for name in GUESSED if name in columns and name != guessed.output)]
+    outputs = {one: name for name in readings for one in loads_with(name)}
+    if load not in outputs:
+        fitting = list(outputs) or [guessed.load]
         raise MeasuredDataError(
             f"the load {load!r} does not go with these columns, which have a reading of {' and of '.join(readings)}: "
             f"{' or '.join(fitting)} does"
         )
-    wire, output = wires[load]
-    return replace(guessed, wire=wire, load=load, inputs=guessed.inputs[:1], output=output)
+    output = outputs[load]
+    wire = OTHER_WIRE.get(load, GUESSED[output][1])
+    inputs = (*guessed.inputs[:1], *sorted(made_load(load).inputs_required))
+    return replace(guessed, wire=wire, load=load, inputs=inputs, output=output)
+
+
+def loads_with(reading: str) -> list[str]:
+    """The presets of loads that move and whose sensor shows `reading`, one of `GUESSED`, also those of other packages."""
+    return [name for name in LOADS if _reading_of(name) == reading]
+
+
+def _reading_of(name: str) -> str:
+    """Empty for a coupon, and for a load of another package that fails: who names it gets the error."""
+    try:
+        load = made_load(name)
+    except PluginError:
+        return ""
+    return load.reading[0] if isinstance(load, AbstractMovingLoad) else ""
 
 
 def _guessed(columns: Mapping[str, Column]) -> DraftModel:
@@ -95,13 +115,15 @@ def _guessed(columns: Mapping[str, Column]) -> DraftModel:
         return DraftModel(
             "flexinol_isobaric", "coupon", "none", COUPON, "strain", "temperature, stress and strain without a drive"
         )
+    inputs = [drive or "voltage"]
     if "angle" in columns:
-        return DraftModel(
-            "niti_table_3_1", "arm", drive or "voltage", (drive or "voltage",), "angle", "the output is an angle"
-        )
-    if "force" in columns and "position" not in columns:
-        why = "the output is a force and nothing moves: a wire between a frame and a load cell"
-        return DraftModel("flexinol_table_3_2", "blocked_wire", drive or "voltage", (drive or "voltage",), "force", why)
-    inputs = (drive or "voltage", *(["mass"] if "mass" in columns else []))
-    why = "the output is a position; `--load bias_spring` takes the other load that has one"
-    return DraftModel("flexinol_table_3_2", "dead_weight", drive or "voltage", inputs, "position", why)
+        output, why = "angle", "the output is an angle"
+    elif "force" in columns and "position" not in columns:
+        output, why = "force", "the output is a force and nothing moves: a wire between a frame and a load cell"
+    else:
+        output, why = "position", "the output is a position"
+        inputs += ["mass"] if "mass" in columns else []
+    load, wire = GUESSED[output]
+    if others := [f"`--load {name}`" for name in loads_with(output) if name != load]:
+        why += f"; {' or '.join(others)} takes {'the other' if len(others) == 1 else 'another'} load that has one"
+    return DraftModel(wire, load, drive or "voltage", tuple(inputs), output, why)
