@@ -33,7 +33,7 @@ def drives(incomplete: str) -> list[str]:
 
 
 def presets(incomplete: str) -> list[str]:
-    return [*wires(incomplete), *loads(incomplete), *drives(incomplete)]
+    return [*wires(incomplete), *loads(incomplete), *drives(incomplete), *controllers(incomplete)]
 
 
 def effects(incomplete: str) -> list[str]:

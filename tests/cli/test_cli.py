@@ -9,8 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from smajax.control.presets import CONTROLLERS
 from smajax.core.parameters import parameter_values
 from smajax.model.presets import build
+from smajax.model.rigs import arm
 from tests.helpers.command_line import smajax_in
 
 
@@ -85,6 +87,21 @@ def test_the_parameters_of_named_presets_are_all_listed(tmp_path: Path) -> None:
     wrong = smajax_in("presets", "arms", cwd=tmp_path)
     assert wrong.code == 2
     assert "no preset `arms`; did you mean 'arm'?" in wrong.said
+
+
+def test_the_gains_of_a_listed_controller_are_listed_and_what_is_of_the_plant_is_not(tmp_path: Path) -> None:
+    names = json.loads(smajax_in("presets", "--json", cwd=tmp_path).out)["controllers"]
+    told = json.loads(smajax_in("presets", *names, "--json", cwd=tmp_path).out)
+    assert list(told) == list(CONTROLLERS)
+    for name, entries in told.items():
+        preset = CONTROLLERS[name]
+        values = parameter_values(preset.make(arm()))
+        assert {*preset.box, preset.main_gain} <= set(entries)
+        assert {one: entry["value"] for one, entry in entries.items()} == {one: values[one] for one in entries}
+        assert not {"wire_length", "cross_section", "recoverable_strain"} & set(entries)
+    lines = smajax_in("presets", "pid", cwd=tmp_path).out.splitlines()
+    assert lines[0] == "pid  (gains of the arm, which are scaled to other loads)"
+    assert lines[1].split()[:3] == ["proportional_gain", "12.8", "V/rad"]
 
 
 def test_a_missing_experiment_file_is_an_error(tmp_path: Path) -> None:

@@ -18,20 +18,24 @@ from smajax.core.wording import aligned
 def _parts(names: Sequence[str]) -> dict[str, dict[str, dict[str, Any]]]:
     """Preset -> its parameters by name, each with value, unit, bounds and meaning. Raises typer.BadParameter.
 
-    Of a wire, a load and a drive together also those of the whole, as `model`.
+    Of a wire, a load and a drive together also those of the whole, as `model`. Of a controller the gains of the arm.
     """
+    from smajax.control.presets import CONTROLLERS
     from smajax.core.names import close_matches
     from smajax.model.presets import DRIVES, LOADS, WIRES, build, made_load
+    from smajax.model.rigs import arm
 
     made: dict[str, Callable[[str], Any]] = {
         **dict.fromkeys(WIRES, lambda name: WIRES[name]()),
         **dict.fromkeys(LOADS, made_load),
         **dict.fromkeys(DRIVES, lambda name: DRIVES[name]()),
+        **dict.fromkeys(CONTROLLERS, lambda name: CONTROLLERS[name].make(arm())),
     }
     for name in names:
         if name not in made:
             raise typer.BadParameter(f"no preset `{name}`{close_matches(name, made, 'there are')}", param_hint="NAMES")
-    result = {name: _entries(made[name](name), ()) for name in names}
+    known = {name: one.known for name, one in CONTROLLERS.items()}  # of the plant
+    result = {name: _entries(made[name](name), known.get(name, ())) for name in names}
     if [next((kind for kind in (WIRES, LOADS, DRIVES) if name in kind), None) for name in names] == [
         WIRES,
         LOADS,
@@ -53,7 +57,7 @@ def _entries(part: Any, without: Collection[str]) -> dict[str, dict[str, Any]]:
             "meaning": one.about,
         }
         for one in parameters(part).values()
-        if one.name not in without
+        if not {one.name, str(one.path[0])} & {*without}
     }
 
 
@@ -81,7 +85,9 @@ def _write(names: Sequence[str], out: Path) -> None:
 def presets(
     names: Annotated[
         list[str] | None,
-        typer.Argument(help="a wire, a load, a drive: list their parameters", autocompletion=completion.presets),
+        typer.Argument(
+            help="a wire, a load, a drive, a controller: list their parameters", autocompletion=completion.presets
+        ),
     ] = None,
     out: Annotated[
         Path | None,
@@ -110,13 +116,16 @@ def presets(
 
 
 def _list(names: Sequence[str], json_out: bool) -> None:
+    from smajax.control.presets import CONTROLLERS
+
     if names:
         parts = _parts(names)
         if json_out:
             typer.echo(json.dumps(parts))
             return
         for name, entries in parts.items():
-            typer.echo(name if entries else f"{name}  (no parameters)")
+            scaled = "  (gains of the arm, which are scaled to other loads)" if name in CONTROLLERS else ""
+            typer.echo(name + scaled if entries else f"{name}  (no parameters)")
             rows = [
                 [
                     f"  {one}",
@@ -129,7 +138,6 @@ def _list(names: Sequence[str], json_out: bool) -> None:
             for line in aligned(rows) if rows else ():
                 typer.echo(line.rstrip())
         return
-    from smajax.control.presets import CONTROLLERS
     from smajax.core.parameters import parameter_values, parameters
     from smajax.model.presets import DRIVES, LOADS, WIRES
     from smajax.model.wire.laws import LAWS
