@@ -35,10 +35,10 @@ def loop_rows(loop: LoopSettings, largest: float | None = None) -> list[list[str
 
 
 def loop_words(loop: LoopSettings) -> str:
-    """`the command up to 6 V, a control period of 10 ms`; "" of nothing known. The noise is the plant's, and left out."""
+    """`the drive's limit of 6 V, a control period of 10 ms`; "" of nothing known. The noise is the plant's, and left out."""
     parts = []
     if loop.command_limit is not None:
-        parts.append(f"the command up to {digits(loop.command_limit, 4)} {loop.command_unit}")
+        parts.append(f"the drive's limit of {digits(loop.command_limit, 4)} {loop.command_unit}")
     if loop.period is not None:
         parts.append(f"a control period of {1e3 * loop.period:g} ms")
     if loop.delay:

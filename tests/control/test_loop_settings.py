@@ -60,7 +60,7 @@ def test_a_loop_takes_limit_filter_and_period_of_the_gains_file_unless_an_option
     assert float(own.data["voltage"].max()) == pytest.approx(4.5)
     (said,) = source_sentences(own.settings)
     assert said == (
-        "As in the file of the gains of pid: the command up to 4.5 V, a control period of 20 ms and a delay of 1 period, "
+        "As in the file of the gains of pid: the drive's limit of 4.5 V, a control period of 20 ms and a delay of 1 period, "
         "largest_voltage 4.5, rate_filter 0.05."
     )
     other = loop(gains, period=0.04, delay=0, values={"amplifier_limit": "9.6 V"})  # 6 V by its gain
@@ -79,7 +79,7 @@ def test_an_older_file_of_gains_is_read_and_what_it_means_is_said(gains: Path) -
     assert result.loop.command_limit == pytest.approx(7.0)
     assert result.loop.period == 0.01
     assert "says neither limit, filter nor control period" in source_sentences(result.settings)[1]
-    assert "the command up to 7 V and a control period of 10 ms" in source_sentences(result.settings)[1]
+    assert "the drive's limit of 7 V and a control period of 10 ms" in source_sentences(result.settings)[1]
 
 
 @pytest.mark.parametrize(
