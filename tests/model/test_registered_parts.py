@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 from typing import Any, ClassVar
 
+import jax.numpy as jnp
+import numpy as np
 import pytest
 
 from smajax.control.presets import CONTROLLERS
@@ -17,7 +19,10 @@ from smajax.model.load.arm import Arm
 from smajax.model.load.dead_weight import DeadWeight
 from smajax.model.preset_sources import origins_of
 from smajax.model.presets import _LOADS, WIRES, build
-from smajax.model.wire.heat import HeatTerm
+from smajax.model.types import Scalar, WireState
+from smajax.model.wire.heat import HeatState, HeatTerm
+from smajax.model.wire.history import DURATION, HistoryTerm, following
+from smajax.simulation.compiled import simulate_compiled
 
 
 @pytest.mark.parametrize("name", _OWN)
@@ -61,6 +66,54 @@ def test_an_effect_without_a_contract_is_an_error_that_names_the_contract_of_its
         dataclasses.replace(system, effects=(_OWN["latent_heat"],))
     with pytest.raises(TypeError, match=r"str is no effect"):
         dataclasses.replace(system, effects=("latent_heat",))
+
+
+def test_an_effect_with_memory_that_does_not_say_what_it_keeps_is_an_error() -> None:
+    """Of the base class, of the duration, of an entry: what is missing, and of which effect."""
+
+    class Clamp(AbstractEffect, HeatTerm):
+        """Follows the temperature, and forgets to inherit from `HistoryTerm`."""
+
+        def history_at_start(self, at: WireState) -> dict[str, Scalar]:
+            return {"lagged": at.temperature, DURATION: jnp.zeros_like(at.stress)}
+
+        def history_after(self, old: WireState, new: WireState) -> dict[str, Scalar]:
+            return {"lagged": following(old, "lagged", old.temperature, new.temperature, jnp.asarray(2.0))}
+
+        def heat_loss(self, wire: Any, at: HeatState) -> Scalar | float:
+            return 1e-3 * (at.temperature - following(at.old, "lagged", at.old.temperature, at.temperature, 2.0))
+
+    class Timeless(Clamp, HistoryTerm):
+        effect_name = "timeless"
+
+        def history_at_start(self, at: WireState) -> dict[str, Scalar]:
+            return {"lagged": at.temperature}
+
+    class Other(Clamp, HistoryTerm):
+        effect_name = "other"
+
+        def history_after(self, old: WireState, new: WireState) -> dict[str, Scalar]:
+            return {"laged": new.temperature}
+
+    class Reads(AbstractEffect, HeatTerm):
+        heat_loss = Clamp.heat_loss
+
+    system = build("flexinol_table_3_2", "dead_weight", "voltage")
+    volts = {"voltage": np.full(11, 3.0)}
+    with pytest.raises(
+        TypeError, match="Clamp has history_at_start, history_after of HistoryTerm, and does not inherit"
+    ):
+        dataclasses.replace(system, effects=(Clamp(),))
+    for effect, message in (
+        (Timeless(), r"effect `timeless`: .*no entry 'duration' \(there are: lagged\)\. .* inherit from HistoryTerm"),
+        (
+            Other(),
+            r"effect `other`: .*no entry 'laged' \(there are: duration, lagged\)\. .*each of its entries, and DURATION",
+        ),
+        (Reads(), r"following 'lagged': .*no entry 'duration' \(there are: none\)"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            simulate_compiled(dataclasses.replace(system, effects=(effect,)), volts, 0.01)
 
 
 def test_a_part_in_a_file_of_its_own_is_one_line_of_a_table() -> None:

@@ -50,6 +50,9 @@ def contract_fault(effect: type) -> str:
         fitting = [contract for contract in CONTRACTS if set(own) & set(methods(contract))] or CONTRACTS
         choices = "; ".join(f"{one.__name__} ({', '.join(methods(one))})" for one in fitting)
         return f"changes no equation: it inherits from no contract. Inherit from the one of its equation, and override a method: {choices}"
+    kept = [name for name in methods(HistoryTerm) if hasattr(effect, name)]
+    if kept and HistoryTerm not in accepted:
+        return f"has {', '.join(kept)} of HistoryTerm, and does not inherit from it: its entries would be missing in the wire's history"
     abstract: frozenset[str] = getattr(effect, "__abstractmethods__", frozenset())
     if abstract:
         return f"lacks the methods {', '.join(sorted(abstract))} of its contract"

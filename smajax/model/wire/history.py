@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import abc
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
+import jax
 import jax.numpy as jnp
 
 from smajax.model.types import Scalar, WireState
@@ -31,11 +32,41 @@ class HistoryTerm(abc.ABC):
 
 
 def history_at_start(terms: Sequence[HistoryTerm], at: WireState) -> dict[str, Scalar]:
-    """All entries of the wire `at` rest."""
+    """All entries of the wire `at` rest. Raises ValueError for a term that reads or writes an entry which none has at the start."""
     history: dict[str, Scalar] = {}
     for term in terms:
         history |= term.history_at_start(at)
+    kinds = tuple(type(term) for term in terms)
+    if kinds not in _checked:
+        _check_entries(terms, dataclasses.replace(at, history=history))
+        _checked.add(kinds)
     return history
+
+
+_checked: set[tuple[type, ...]] = set()  # entries are of the class: to look at them once is enough
+
+
+def _check_entries(terms: Sequence[HistoryTerm], at: WireState) -> None:
+    """Raise ValueError for a term whose `history_after` reads or returns what no `history_at_start` has."""
+    for term in terms:
+        name = getattr(term, "effect_name", type(term).__name__)
+        try:
+            after = jax.eval_shape(term.history_after, at, at)
+        except (LookupError, ValueError) as missing:
+            raise ValueError(f"effect `{name}`: {_missing(str(missing.args[0]), at.history)}") from None
+        if strange := sorted(after.keys() - at.history.keys()):
+            raise ValueError(f"effect `{name}`: {_missing(strange[0], at.history)}")
+
+
+def _missing(entry: str, history: Mapping[str, Scalar]) -> str:
+    """What to do about an entry that is not there; a message that already says so as it is."""
+    if " " in entry:
+        return entry
+    there = ", ".join(sorted(history)) or "none"
+    return (
+        f"the wire's history has no entry {entry!r} (there are: {there}). The effect has to inherit from HistoryTerm, and its history_at_start "
+        "to return each of its entries, and DURATION where the length of a step is asked for."
+    )
 
 
 def history_after(terms: Sequence[HistoryTerm], old: WireState, new: WireState) -> dict[str, Scalar]:
@@ -71,6 +102,9 @@ def following(old: WireState, name: str, before: Scalar, now: Scalar, time_const
     Exact for a straight line between the two, $x + (x_{old} - x_{before}) e^{-h/\tau} - (x - x_{before})(1 - e^{-h/\tau})\tau/h$:
     a lag of a few steps, or of less than one, is as good as a long one. `now` itself at 0 s.
     """
+    for entry in (DURATION, name):
+        if entry not in old.history:
+            raise ValueError(f"following {name!r}: {_missing(entry, old.history)}")
     # A time constant of a femtosecond is none, and has a derivative that zero has not.
     steps = jnp.maximum(old.history[DURATION], 1e-12) / (time_constant + 1e-15)
     gone = forgotten(steps)
