@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import sys
+import types
 from typing import Any, ClassVar
 
 import jax.numpy as jnp
-import numpy as np
 import pytest
 
 from smajax.control.presets import CONTROLLERS
@@ -14,7 +15,7 @@ from smajax.core.parameters import parameters
 from smajax.core.plugins import resolved
 from smajax.model.effects.base import AbstractEffect
 from smajax.model.effects.candidate import Width
-from smajax.model.effects.library import _OWN, _wrong
+from smajax.model.effects.library import _OWN, _effect_of, _wrong
 from smajax.model.load.arm import Arm
 from smajax.model.load.dead_weight import DeadWeight
 from smajax.model.preset_sources import origins_of
@@ -28,6 +29,24 @@ from smajax.simulation.compiled import simulate_compiled
 @pytest.mark.parametrize("name", _OWN)
 def test_an_effect_of_the_library_is_held_to_what_a_plug_in_is(name: str) -> None:
     assert _wrong(name, _OWN[name]) == ""
+
+
+def test_an_effect_of_the_library_that_is_not_complete_is_named_with_its_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Misspelt(AbstractEffect, HeatTerm):
+        effect_name = "misspelt"
+        canditate = _OWN["latent_heat"].candidate
+
+        def heat_loss(self, wire: Any, at: HeatState) -> float:
+            return 1.0
+
+    monkeypatch.setitem(sys.modules, "smajax.model.effects.misspelt", types.SimpleNamespace(Misspelt=Misspelt))
+    with pytest.raises(
+        TypeError, match=r"the effect in smajax/model/effects/misspelt.py lacks candidate, which every effect"
+    ):
+        _effect_of("misspelt")
+    monkeypatch.setitem(sys.modules, "smajax.model.effects.draught", types.SimpleNamespace())
+    with pytest.raises(LookupError, match="has no class with `effect_name = 'draught'`"):
+        _effect_of("draught")
 
 
 def test_a_misspelt_method_of_an_effect_is_an_error() -> None:
@@ -81,7 +100,9 @@ def test_an_effect_with_memory_that_does_not_say_what_it_keeps_is_an_error() -> 
             return {"lagged": following(old, "lagged", old.temperature, new.temperature, jnp.asarray(2.0))}
 
         def heat_loss(self, wire: Any, at: HeatState) -> Scalar | float:
-            return 1e-3 * (at.temperature - following(at.old, "lagged", at.old.temperature, at.temperature, 2.0))
+            return 1e-3 * (
+                at.temperature - following(at.old, "lagged", at.old.temperature, at.temperature, jnp.asarray(2.0))
+            )
 
     class Timeless(Clamp, HistoryTerm):
         effect_name = "timeless"
@@ -99,7 +120,7 @@ def test_an_effect_with_memory_that_does_not_say_what_it_keeps_is_an_error() -> 
         heat_loss = Clamp.heat_loss
 
     system = build("flexinol_table_3_2", "dead_weight", "voltage")
-    volts = {"voltage": np.full(11, 3.0)}
+    volts = {"voltage": jnp.full(11, 3.0)}
     with pytest.raises(
         TypeError, match="Clamp has history_at_start, history_after of HistoryTerm, and does not inherit"
     ):

@@ -74,22 +74,8 @@ _NAMES = (
 )
 
 
-def _effect_of(name: str) -> type[AbstractEffect]:
-    """The class with that `effect_name` in the file of that name. Raises LookupError where it has none."""
-    module = import_module(f"smajax.model.effects.{name}")
-    for one in vars(module).values():
-        if isinstance(one, type) and issubclass(one, AbstractEffect) and getattr(one, "effect_name", "") == name:
-            return one
-    raise LookupError(
-        f"smajax/model/effects/{name}.py has no class with `effect_name = {name!r}`; give its effect that name."
-    )
-
-
-_OWN: dict[str, type[AbstractEffect]] = {name: _effect_of(name) for name in _NAMES}
-
-
 def _wrong(name: str, effect: Any) -> str:
-    """What keeps a class of another package from being an effect of that name."""
+    """What keeps a class, of ours or of another package, from being an effect of that name."""
     if not (isinstance(effect, type) and issubclass(effect, AbstractEffect)):
         return f"is {effect!r}; expected a class of `smajax.AbstractEffect`"
     adopt(effect)
@@ -120,6 +106,22 @@ def _wrong(name: str, effect: Any) -> str:
                 f"and `above` one of {', '.join(map(repr, ORIGINS))}"
             )
     return contract_fault(effect)
+
+
+def _effect_of(name: str) -> type[AbstractEffect]:
+    """The class with that `effect_name` in the file of that name. Raises LookupError where it has none, TypeError for one that is not complete."""
+    module = import_module(f"smajax.model.effects.{name}")
+    for one in vars(module).values():
+        if isinstance(one, type) and issubclass(one, AbstractEffect) and getattr(one, "effect_name", "") == name:
+            if fault := _wrong(name, one):
+                raise TypeError(f"the effect in smajax/model/effects/{name}.py {fault}.")
+            return one
+    raise LookupError(
+        f"smajax/model/effects/{name}.py has no class with `effect_name = {name!r}`; give its effect that name."
+    )
+
+
+_OWN: dict[str, type[AbstractEffect]] = {name: _effect_of(name) for name in _NAMES}
 
 
 # Ours, then those of other packages (`smajax.core.plugins`), in the order of their names.
