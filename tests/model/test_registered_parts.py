@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import inspect
+import re
 import sys
 import types
 from typing import Any, ClassVar
@@ -13,8 +15,10 @@ import pytest
 from smajax.control.presets import CONTROLLERS
 from smajax.core.parameters import parameters
 from smajax.core.plugins import resolved
+from smajax.model.effects import base as effects_base
 from smajax.model.effects.base import AbstractEffect
 from smajax.model.effects.candidate import Width
+from smajax.model.effects.contract_check import CONTRACTS, methods
 from smajax.model.effects.library import _OWN, _effect_of, _wrong
 from smajax.model.load.arm import Arm
 from smajax.model.load.dead_weight import DeadWeight
@@ -189,3 +193,15 @@ def test_a_preset_states_the_sources_of_its_numbers(name: str) -> None:
 
 def test_controllers_are_presets_with_a_main_gain() -> None:
     assert all(one.main_gain for one in CONTROLLERS.values())
+
+
+def test_the_table_of_contracts_has_every_contract_with_its_methods_and_arguments() -> None:
+    """What a contributor reads before any other file (`effects/base.py`, which the reference shows)."""
+    rows = re.findall(r"^\| [^|]+ \| `([\w.]+)` \| (.+) \|$", effects_base.__doc__ or "", re.MULTILINE)
+    written = {name: re.findall(r"`(\w+)\(([^)]*)\)`", told) for name, told in rows}
+    assert written == {
+        f"{one.__module__.removeprefix('smajax.model.')}.{one.__name__}": [
+            (name, ", ".join([*inspect.signature(getattr(one, name)).parameters][1:])) for name in methods(one)
+        ]
+        for one in CONTRACTS
+    }

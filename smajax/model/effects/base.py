@@ -4,17 +4,24 @@ An effect is an immutable module whose coefficients are `parameter` fields; the 
 its switches at their base value (zero) every method must return exactly what the base model has, so that the extended
 model contains the base model. What it may change is said beside each equation, by a class of one to three methods:
 
-| equation | contract |
-|---|---|
-| heat balance | `wire.heat.HeatTerm` |
-| resistance | `wire.resistance.ResistanceTerm` |
-| kinetics | `wire.kinetics_terms.ShapeTerm`, `RangeTerm`, `PopulationTerm` |
-| constitutive law | `wire.constitutive.ConstitutiveTerm` |
-| any of these, where the path matters | `wire.history.HistoryTerm` |
-| motion | `load.force.ForceTerm`, `load.friction.FrictionTerm`, `load.mounting.MountingTerm` |
-| drive and supply | `drive.inputs.CommandTerm`, `drive.supply.SeriesTerm`, `SupplyTerm` |
-| sensor | `sensor_reading.SensorTerm`, `SensorLagTerm` |
-| recorded input | `drive.inputs.InputLagTerm` |
+| equation | contract | its methods |
+|---|---|---|
+| heat balance | `wire.heat.HeatTerm` | `stored_heat(wire, temperature, fraction)`, `heat_loss(wire, at)`, `ambient_shift(time)` |
+| resistance | `wire.resistance.ResistanceTerm` | `resistance_factor(temperature, fraction)` |
+| kinetics: shape | `wire.kinetics_terms.ShapeTerm` | `heating_shape(z, remaining)`, `cooling_shape(z, remaining)` |
+| kinetics: range | `wire.kinetics_terms.RangeTerm` | `heating_distance(law, z, temperature, stress, old)`, `cooling_distance(law, z, temperature, stress, old)` |
+| kinetics: a second part of the wire | `wire.kinetics_terms.PopulationTerm` | `second_conditions()` |
+| constitutive law | `wire.constitutive.ConstitutiveTerm` | `strain(wire, at)`, `modulus_change(wire, fraction)` |
+| any of these, where the path matters | `wire.history.HistoryTerm` | `history_at_start(at)`, `history_after(old, new)` |
+| motion: force | `load.force.ForceTerm` | `resisting_force(load, at)` |
+| motion: friction | `load.friction.FrictionTerm` | `friction_limit(load_at_rest)`, `friction_level(speed)`, `presliding()` |
+| motion: mounting | `load.mounting.MountingTerm` | `loose_length()` |
+| drive | `drive.inputs.CommandTerm` | `command(channel, value)` |
+| supply: leads | `drive.supply.SeriesTerm` | `series_resistance()` |
+| supply: voltage | `drive.supply.SupplyTerm` | `voltage_share(circuit, old)`, `history_after_supply(circuit, old)` |
+| sensor | `sensor_reading.SensorTerm` | `sensed(reading, time, last)` |
+| sensor: lag | `sensor_reading.SensorLagTerm` | `sensor_time_constant()` |
+| recorded input | `drive.inputs.InputLagTerm` | `input_lag(time)` |
 
 `sma.contracts` has all of them. The equations know these contracts and no effect; `effects.grouping` sorts the effects of a system by them.
 """
