@@ -157,8 +157,9 @@ def effects() -> str:
         ]
         for name, effect in own.items():
             if effect.candidate.equation == equation:
+                named = "; where `[effects] only` names it" if effect.candidate.only_if_named else ""
                 lines.append(
-                    f"| [`{name}`](#{effect.__module__}) | {effect.candidate.title} | {_cell(effect.candidate.formula)} | {odds_in_words(effect)} |"
+                    f"| [`{name}`](#{effect.__module__}) | {effect.candidate.title} | {_cell(effect.candidate.formula)} | {odds_in_words(effect)}{named} |"
                 )
     modules = dict.fromkeys(
         effect.__module__ for equation in EQUATIONS for effect in own.values() if effect.candidate.equation == equation

@@ -38,7 +38,8 @@ def describe(wire: str, load: str, drive: str, law: str = "") -> ModelDescriptio
     system = build(wire, load, drive, law)
     check_together(system, load, drive)
     # An effect is part of the base model when the experiment names a parameter of it.
-    whole = extended(system, candidates(system, None, ()))
+    possible = applicable(system)
+    whole = extended(system, possible)
     values = parameter_values(system)
     return ModelDescription(
         parameters={
@@ -50,7 +51,7 @@ def describe(wire: str, load: str, drive: str, law: str = "") -> ModelDescriptio
         outputs=sensors_of(system),
         inputs_squared=system.drive.inputs_squared,
         heats=system.drive.inputs_required,
-        effects=frozenset(candidates(system, None, ())),
+        effects=frozenset(possible),
         scale=None if isinstance(system.load, AbstractCoupon) else lambda values: _scale(_at(system, values)),
         disorder=lambda values: disorder(_at(system, values)),
         inputs_sampled=system.load.inputs_required if isinstance(system.load, AbstractCoupon) else frozenset(),
@@ -115,20 +116,29 @@ CATALOGUE = Catalogue(
 )
 
 
-def candidates(
-    system: System, only: tuple[str, ...] | None, excluded: tuple[str, ...], clocked: bool = True
-) -> tuple[str, ...]:
-    """Names of the effects that this system can show: a coupon has no heat balance, no circuit and no guide.
-
-    `clocked`: whether the samples have times; where they have not, what is a matter of seconds is tried only if asked for.
-    """
+def applicable(system: System) -> tuple[str, ...]:
+    """Names of the effects that can change anything of this system: a coupon has no heat balance, no circuit and no guide."""
     useless = {"heat", "electrical", "mechanics"} if isinstance(system.load, AbstractCoupon) else set()
     return tuple(
         name
         for name, effect in LIBRARY.items()
-        if effect.candidate.equation not in useless
-        and effect.candidate.applies(system)
-        and (clocked or not effect.candidate.needs_time or only is not None)
+        if effect.candidate.equation not in useless and effect.candidate.applies(system)
+    )
+
+
+def candidates(
+    system: System, only: tuple[str, ...] | None, excluded: tuple[str, ...], clocked: bool = True
+) -> tuple[str, ...]:
+    """Names of the effects that a search looks for: those that this system can show.
+
+    One that is a candidate only where it is named is among them where `only` names it.
+    `clocked`: whether the samples have times; where they have not, what is a matter of seconds is tried only if asked for.
+    """
+    return tuple(
+        name
+        for name in applicable(system)
+        if (clocked or not LIBRARY[name].candidate.needs_time or only is not None)
+        and (not LIBRARY[name].candidate.only_if_named or only is not None)
         and name not in excluded
         and (only is None or name in only)
     )

@@ -17,6 +17,7 @@ from smajax.model.sensor_reading import SensorTerm as SensorTerm
 from smajax.model.wire.constitutive import ConstitutiveTerm as ConstitutiveTerm
 from smajax.model.wire.heat import HeatTerm as HeatTerm
 from smajax.model.wire.history import HistoryTerm as HistoryTerm
+from smajax.model.wire.kinetics_terms import PlaceTerm as PlaceTerm
 from smajax.model.wire.kinetics_terms import PopulationTerm as PopulationTerm
 from smajax.model.wire.kinetics_terms import RangeTerm as RangeTerm
 from smajax.model.wire.kinetics_terms import ShapeTerm as ShapeTerm

@@ -185,6 +185,11 @@ def test_two_outputs_have_their_own_noise_and_offset(bench: Path) -> None:
     )
     assert temperature.noise_sigma == pytest.approx(0.5 * 0.427, rel=0.01)
     np.testing.assert_allclose(got.runs[0].outputs["temperature"], 1e3 * got.runs[0].output - 273.15, atol=1e-9)
+    # These numbers are degrees Celsius, and are declared to be kelvins.
+    assert any(
+        "the temperature falls to -273.18 degC" in told and "is it in degC, and not in K?" in told
+        for told in got.warnings
+    )
 
 
 def test_the_temperature_that_a_run_starts_with_may_be_known(bench: Path) -> None:

@@ -57,7 +57,10 @@ UNLOADED = _inputs(
 )
 UNSTRESSED = _inputs(temperature=_ramps(90.0, 20.0, 90.0, 60.0, 50.0), stress=np.full(360, 5e6))
 HELD = _inputs(temperature=_ramps(20.0, 110.0, 20.0, 90.0), stress=np.repeat([150e6, 80e6, 150e6], 90))
+# Through both ranges from end to end, and through a part of them.
+CYCLED = _inputs(temperature=_ramps(82.0, 94.0, 67.0, 56.0, 91.0), stress=np.full(360, 1e8))
 RIGS = {
+    "cycled": (COUPON, CYCLED, ("transformation_curve",)),
     "strokes": (
         DEAD_WEIGHT,
         STROKES,

@@ -19,6 +19,7 @@ from smajax.model.load.force import EndMotion
 from smajax.model.presets import build
 from smajax.model.system import initial_state
 from smajax.model.wire.heat import HeatState, convection
+from smajax.model.wire.kinetics_terms import PlaceTerm
 
 
 def _old(**methods: Any) -> AbstractEffect:
@@ -37,7 +38,8 @@ AT = HeatState(jnp.asarray(60.0), jnp.asarray(20.0), jnp.asarray(0.4), jnp.asarr
 
 
 def test_every_method_of_old_belongs_to_a_contract() -> None:
-    assert set(OLD.values()) == set(CONTRACTS)
+    # The place on the shape is newer than that class.
+    assert set(OLD.values()) == set(CONTRACTS) - {PlaceTerm}
     assert max(len(methods(contract)) for contract in CONTRACTS) <= 3
 
 

@@ -74,6 +74,7 @@ SOME = (
     "lagging_transformation",
     "stress_dependent_width",
     "two_part_transformation",
+    "transformation_curve",
 )
 
 

@@ -32,6 +32,7 @@ WARMS = 5.0  # K above the air: less transforms nothing
 LARGEST_STROKE, SMALLEST_STROKE = 0.3, 1e-4
 COLDEST_IN_K = 200.0  # degC: where a record never falls below, it is of a furnace, or in kelvin
 WARMEST_AIR = 60.0  # degC
+COLDEST = -100.0  # degC: no bench is colder, but for one whose degC are declared to be K
 IN_COMMON = 0.9
 FOLLOWS, LEAST = 0.2, 20  # rank correlation of heat and output; samples
 AGAINST = 0.5  # rank correlation of heat and output from which on a wrong sign is a sign turned round
@@ -69,6 +70,8 @@ def _size_warnings(runs: Sequence[ReadRun]) -> list[str]:
         ends = _extremes(runs, name)
         if ends is not None and ends[0] > warmest:
             result.append(f"the {name} never falls below {ends[0]:.5g} degC; is it in K, or in degF?")
+        elif ends is not None and ends[0] < COLDEST:
+            result.append(f"the {name} falls to {ends[0]:.5g} degC; is it in degC, and not in K?")
     return result
 
 

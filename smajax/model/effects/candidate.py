@@ -113,6 +113,9 @@ class Candidate:
     # Whether the load may stick and jump with it: then what a fit gains by it may be the integration's
     # (`attribution.step_size_check`).
     stick_slip: bool = False
+    # Whether the search looks for it only where the experiment file names it (`[effects] only`): one whose part in the search is
+    # not settled.
+    only_if_named: bool = False
     # Whether it can change anything of this wire, load and drive: a candidate that cannot is not looked at.
     applies: Callable[[Actuator], bool] = _always
     # Whether runs of that extent could show it: a candidate that they cannot is not looked at.

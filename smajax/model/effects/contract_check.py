@@ -14,13 +14,14 @@ from smajax.model.sensor_reading import SensorLagTerm, SensorTerm
 from smajax.model.wire.constitutive import ConstitutiveTerm
 from smajax.model.wire.heat import HeatTerm
 from smajax.model.wire.history import HistoryTerm
-from smajax.model.wire.kinetics_terms import PopulationTerm, RangeTerm, ShapeTerm
+from smajax.model.wire.kinetics_terms import PlaceTerm, PopulationTerm, RangeTerm, ShapeTerm
 from smajax.model.wire.resistance import ResistanceTerm
 
 CONTRACTS: tuple[abc.ABCMeta, ...] = (
     HeatTerm,
     ResistanceTerm,
     ShapeTerm,
+    PlaceTerm,
     RangeTerm,
     PopulationTerm,
     ConstitutiveTerm,

@@ -21,7 +21,7 @@ from smajax.model.sensor_reading import SensorLagTerm, SensorTerm, SensorTerms
 from smajax.model.wire.constitutive import ConstitutiveTerm, ConstitutiveTerms
 from smajax.model.wire.heat import HeatTerm
 from smajax.model.wire.history import HistoryTerm
-from smajax.model.wire.kinetics_terms import KineticsTerms, PopulationTerm, RangeTerm, ShapeTerm
+from smajax.model.wire.kinetics_terms import KineticsTerms, PlaceTerm, PopulationTerm, RangeTerm, ShapeTerm
 from smajax.model.wire.resistance import ResistanceTerm
 
 
@@ -71,6 +71,7 @@ def grouped(effects: Sequence[AbstractEffect]) -> Terms:
         resistance=tuple(one for one in effects if isinstance(one, ResistanceTerm)),
         kinetics=KineticsTerms(
             shapes=tuple(one for one in effects if isinstance(one, ShapeTerm)),
+            places=tuple(one for one in effects if isinstance(one, PlaceTerm)),
             ranges=tuple(one for one in effects if isinstance(one, RangeTerm)),
             populations=tuple(one for one in effects if isinstance(one, PopulationTerm)),
         ),

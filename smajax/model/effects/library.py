@@ -35,6 +35,7 @@ _NAMES = (
     "dead_zone",
     "pwm_smoothing",
     "pulsed_voltage",
+    "transformation_curve",
     "smooth_transformation",
     "asymmetric_transformation",
     "two_part_transformation",

@@ -5,5 +5,5 @@ fraction (`kinetics`; `two_populations` for two kinds of wire in one), stress an
 
 Constants: `Wire`, `Kinetics` and the others in `wire`; the choices that make an author's law in `shape`, `conditions`,
 `branch_amplitude`, `variants`, `stiffness` and `form`, by name in `laws`.
-Contracts: `HeatTerm`, `ResistanceTerm`, `ShapeTerm`, `RangeTerm`, `PopulationTerm`, `ConstitutiveTerm`, `HistoryTerm`.
+Contracts: `HeatTerm`, `ResistanceTerm`, `ShapeTerm`, `PlaceTerm`, `RangeTerm`, `PopulationTerm`, `ConstitutiveTerm`, `HistoryTerm`.
 """

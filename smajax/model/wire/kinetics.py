@@ -84,7 +84,10 @@ def martensite_left(
 ) -> Scalar:
     r"""h((y_A - A_s)/(A_f - A_s)) of the law's shape and the effects: 1 below the range (Elahinia 2004, eq. 3.10)."""
     z = heating_distance(law, terms, temperature, stress, old)
-    share = law.shape.martensite_left(z)
+    place = z
+    for placed in terms.places:
+        place = placed.heating_place(place)
+    share = law.shape.martensite_left(place)
     for term in terms.shapes:
         share = term.heating_shape(z, share)
     return _or_none(share)
@@ -99,7 +102,10 @@ def austenite_left(
 ) -> Scalar:
     r"""k((y_M - M_f)/(M_s - M_f)) of the law's shape and the effects: 1 above the range (Elahinia 2004, eq. 3.5)."""
     z = cooling_distance(law, terms, temperature, stress, old)
-    share = law.shape.austenite_left(z)
+    place = z
+    for placed in terms.places:
+        place = placed.cooling_place(place)
+    share = law.shape.austenite_left(place)
     for term in terms.shapes:
         share = term.cooling_shape(z, share)
     return _or_none(share)
@@ -145,7 +151,7 @@ def curve_on(
     stress: Scalar,
 ) -> Scalar:
     """`fraction_on` of `curves`, with the one shape of the branch computed, where no effect shapes the two apart."""
-    if terms.shapes:
+    if terms.shape_branches:
         return fraction_on(state, branch, *curves(law, terms, state, temperature, stress))
     at = temperature, stress, state
     mirrored = 1.0 - cooling_distance(law, terms, *at)
@@ -156,7 +162,7 @@ def curve_on(
 
 def open_branches(law: Kinetics, terms: KineticsTerms, state: WireState) -> Branch:
     """Branches whose range the wire is in (or before) at `state`: one that is behind it transforms nothing any more."""
-    if terms.shapes:
+    if terms.shape_branches:
         h, k = _shares(law, terms, state)
         return Branch(h > 0.0, k > 0.0)
     at = state.temperature, state.stress, over(state, 0.0)

@@ -22,6 +22,18 @@ class ShapeTerm(abc.ABC):  # noqa: B024  # each method by itself is enough
         return remaining
 
 
+class PlaceTerm(abc.ABC):  # noqa: B024  # each method by itself is enough
+    """Another place at which the law's shape is read. The directions of a step remain those of the distance itself."""
+
+    def heating_place(self, z: Scalar) -> Scalar:
+        """Where the shape is read at the reduced distance z; rises with z."""
+        return z
+
+    def cooling_place(self, z: Scalar) -> Scalar:
+        """Likewise on cooling."""
+        return z
+
+
 class RangeTerm(abc.ABC):  # noqa: B024  # each method by itself is enough
     """A range that is elsewhere. The direction of a step is then that of the moved distance."""
 
@@ -46,8 +58,14 @@ class KineticsTerms(NamedTuple):
     """All that effects change in the kinetics of one wire."""
 
     shapes: tuple[ShapeTerm, ...] = ()
+    places: tuple[PlaceTerm, ...] = ()
     ranges: tuple[RangeTerm, ...] = ()
     populations: tuple[PopulationTerm, ...] = ()
+
+    @property
+    def shape_branches(self) -> bool:
+        """Whether an effect shapes the two branches, which are then no mirror images of each other."""
+        return bool(self.shapes or self.places)
 
 
 NO_TERMS = KineticsTerms()

@@ -21,6 +21,7 @@ from smajax.core.display_units import label
 from smajax.core.wording import and_listed, per_cent
 from smajax.model.effects.library import LIBRARY
 from smajax.report.narrative import caveats
+from smajax.report.narrative.curve import curve_sentences
 from smajax.report.narrative.record_errors import of_wrong_records
 from smajax.report.narrative.rounds import reason_text
 from smajax.report.narrative.unknown import unknown_sentences
@@ -57,7 +58,8 @@ def summary(findings: Findings) -> tuple[str, ...]:
     sentences += caveats.of_priors_left(findings)
     for effect in findings.added:
         meaning = caveats.of_the_preset(findings, effect) or LIBRARY[effect.name].candidate.sentence
-        sentences += [meaning, *caveats.of_a_size(findings, effect)]
+        values = {name: one.value for name, one in effect.coefficients.items()}
+        sentences += [meaning, *curve_sentences(effect.name, values), *caveats.of_a_size(findings, effect)]
     sentences += caveats.held_out_warnings(findings)
     sentences += caveats.of_a_faint_trace(findings)
     sentences += caveats.of_unlike_outputs(findings)
