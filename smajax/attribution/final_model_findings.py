@@ -137,7 +137,7 @@ def over_runs(model: Model, place: int, error: float | None) -> tuple[float, flo
 
 
 def priors_found(job: Job, setting: Search) -> tuple[PriorFinding, ...]:
-    """The priors that the experiment file gives, of effects that are candidates and of the presets, as they were used."""
+    """The priors that the experiment file gives, of effects that are candidates, of the presets and of unknowns, as they were used."""
     declared, table = setting.declared, parameters(job.problem.system)
     named = {*declared.odds, *(name.split(".", 1)[0] for name in declared.coefficients)}
     effects = [name for name in setting.candidates if name in named]
@@ -166,4 +166,11 @@ def priors_found(job: Job, setting: Search) -> tuple[PriorFinding, ...]:
         findings.append(
             PriorFinding(name, table[name].unit, None, used.base, used.sigma, used.logarithmic, None, *stands)
         )
+    # A value of each run's own has one prior.
+    of_unknowns = {name.split("[")[0]: one for name, one in setting.of_unknowns.items()}
+    findings += [
+        PriorFinding(name, table[name].unit, None, one.base, one.sigma, one.logarithmic, of_unknown=True)
+        for name, one in of_unknowns.items()
+        if name in table
+    ]
     return tuple(findings)

@@ -84,7 +84,7 @@ def _unit(text: str, like: str | None = None) -> Any:
             raise ValueError("no power of a unit")
         # Inside a compound unit ("J/(kg degC)") a degree is a difference: pint's as_delta.
         return _registry().parse_units(name, as_delta=True)
-    except MemoryError:
+    except (MemoryError, ImportError):  # a unit library that lacks a package of its own says so itself
         raise
     except Exception as error:  # besides its own errors the unit library lets those of Python's tokenizer through
         guess = _meant(text)

@@ -123,6 +123,10 @@ def test_the_hidden_effect_is_found_beside_values_of_the_runs_own_and_a_prior(fo
         assert one.value == pytest.approx(nominal + apart, abs=4.0 * one.standard_error)
     assert after["martensite_start"].prior_of_unknown
     assert after["martensite_start"].prior_base == 54.0
+    (listed,) = [one for one in found.priors if one.name == "martensite_start"]
+    assert (listed.base, listed.width, listed.of_unknown) == (54.0, 1.0, True)
+    said = "The prior of martensite_start is 54 °C ± 1 K by the experiment file; without it martensite_start has its bounds alone."
+    assert said in narrate(found).check
 
 
 def test_a_missing_sample_counts_nowhere(found: Findings, experiment: Experiment) -> None:

@@ -112,3 +112,12 @@ def test_a_prefix_moves_the_point_and_changes_no_bit() -> None:
             assert parse_quantity(f"{number} {unit}", expected) == value
             assert parse_quantity(f"{number} {unit}", expected, difference=True) == value
     assert parse_quantity("0." + "0" * 80 + "1e81 mm", "m") == pytest.approx(0.001)
+
+
+def test_a_unit_library_that_lacks_a_package_is_no_unknown_unit(monkeypatch: pytest.MonkeyPatch) -> None:
+    def without() -> object:
+        raise ModuleNotFoundError("No module named 'platformdirs'")
+
+    monkeypatch.setattr("smajax.core.units._registry", without)
+    with pytest.raises(ModuleNotFoundError, match="platformdirs"):
+        convert(1.0, "furlong", "m")
