@@ -36,14 +36,8 @@ def history_at_start(terms: Sequence[HistoryTerm], at: WireState) -> dict[str, S
     history: dict[str, Scalar] = {}
     for term in terms:
         history |= term.history_at_start(at)
-    kinds = tuple(type(term) for term in terms)
-    if kinds not in _checked:
-        _check_entries(terms, dataclasses.replace(at, history=history))
-        _checked.add(kinds)
+    _check_entries(terms, dataclasses.replace(at, history=history))
     return history
-
-
-_checked: set[tuple[type, ...]] = set()  # entries are of the class: to look at them once is enough
 
 
 def _check_entries(terms: Sequence[HistoryTerm], at: WireState) -> None:
