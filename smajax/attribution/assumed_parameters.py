@@ -9,6 +9,7 @@ import numpy as np
 
 from smajax.attribution.findings import AssumedParameter
 from smajax.attribution.job import Job
+from smajax.core.names_of_runs import parameter_of
 from smajax.core.parameters import get_parameters, parameters
 from smajax.data.experiment.catalogue import WIRE_SIZES
 from smajax.fit.base_model import base_model
@@ -19,7 +20,7 @@ def assumed(job: Job, presets: Collection[str] = ()) -> tuple[AssumedParameter, 
     """Parameters of the base model that are not fitted and that no log gives. `presets`: those of presets that are fitted."""
     experiment, model = job.experiment, base_model(job.experiment)
     logged = {own for own, channel in REPLACED.items() if all(channel in run.inputs for run in experiment.runs)}
-    unknown = {name.split("[")[0] for name in job.unknowns}
+    unknown = {parameter_of(name) for name in job.unknowns}
     own = set.intersection(*({*run.parameters} for run in experiment.runs))  # given with each run
     known = {*unknown, *logged, *presets, *own}
     table = {name: entry for name, entry in parameters(model).items() if name not in known}
@@ -42,7 +43,7 @@ def expansion_not_given(job: Job, fitted: Mapping[str, float] = MappingProxyType
     """
     experiment, model = job.experiment, base_model(job.experiment)
     names = ("thermal_modulus", "young_modulus_martensite", "young_modulus_austenite")
-    unknown = (name.split("[")[0] for name in job.unknowns)
+    unknown = (parameter_of(name) for name in job.unknowns)
     own = {*experiment.parameters, *unknown, *(name for run in experiment.runs for name in run.parameters)}
     if not set(names) <= parameters(model).keys() or names[0] in own:
         return None

@@ -14,6 +14,7 @@ from smajax.attribution.leave_one_run_out import jackknife_error
 from smajax.attribution.model_fits import Evidence, Model, Search
 from smajax.attribution.nuisance_grid import scores_at
 from smajax.attribution.prior_finding import PriorFinding
+from smajax.core.names_of_runs import parameter_of
 from smajax.core.parameters import parameter_values, parameters
 from smajax.data.experiment.record import DeclaredPriors
 from smajax.fit.base_model import base_model
@@ -167,7 +168,7 @@ def priors_found(job: Job, setting: Search) -> tuple[PriorFinding, ...]:
             PriorFinding(name, table[name].unit, None, used.base, used.sigma, used.logarithmic, None, *stands)
         )
     # A value of each run's own has one prior.
-    of_unknowns = {name.split("[")[0]: one for name, one in setting.of_unknowns.items()}
+    of_unknowns = {parameter_of(name): one for name, one in setting.of_unknowns.items()}
     findings += [
         PriorFinding(name, table[name].unit, None, one.base, one.sigma, one.logarithmic, of_unknown=True)
         for name, one in of_unknowns.items()

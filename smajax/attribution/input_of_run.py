@@ -25,6 +25,7 @@ from smajax.attribution.joint_search import comparison_settings
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model, independent_error
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.record_error import RecordError
+from smajax.core.names_of_runs import of_run
 from smajax.core.parameters import parameters
 from smajax.data.experiment.record import Experiment, Run
 from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
@@ -138,7 +139,7 @@ def _fits(setting: Search, host: Model, runs: Sequence[str]) -> list[tuple[_Even
     problem = own.with_system(whole, per_run=per_run)
     (left,) = misfits(own, [host.values[slots]])
     worst = np.argsort(-(own.by_run(left) ** 2).sum(axis=1), kind="stable")[:MOST_RUNS]
-    events = {f"{kind.coefficient}[{runs[run]}]": (kind, runs[run]) for run in worst for kind in kinds}
+    events = {of_run(kind.coefficient, runs[run]): (kind, runs[run]) for run in worst for kind in kinds}
     joint = _with_events(setting, host, problem, events)
     groups = []
     for name, (kind, _) in events.items():

@@ -19,6 +19,7 @@ import numpy as np
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model
+from smajax.core.names_of_runs import of_run, parameter_of
 from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
 from smajax.fit.outputs_of_runs import misfits
 from smajax.fit.problem import Problem
@@ -110,7 +111,10 @@ def _own(problem: Problem, names: Sequence[str], owner: np.ndarray) -> np.ndarra
     """Of each of `names` the part of the runs whose own value it is, -1 of a shared one; `owner`: the part of each series."""
     part = owner[:: len(problem.batch.outputs)]
     run_of = {
-        name: part[k] for k, run in enumerate(problem.per_run.runs) for name in names if name.endswith(f"[{run}]")
+        name: part[k]
+        for k, run in enumerate(problem.per_run.runs)
+        for name in names
+        if name == of_run(parameter_of(name), run)
     }
     return np.asarray([run_of.get(name, -1) for name in names], dtype=int)
 

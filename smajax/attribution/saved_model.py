@@ -13,6 +13,7 @@ from smajax.attribution.job import Job
 from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
+from smajax.core.names_of_runs import is_of_run, parameter_of
 from smajax.data.model_file.actuator_model import ActuatorModel
 from smajax.data.model_file.of_experiment import actuator_model, range_of, rounded
 from smajax.data.model_file.record import LikelyModel, ModelOutput
@@ -52,7 +53,7 @@ def saved_model(
     return actuator_model(
         job.experiment,
         likely,
-        {name.split("[")[0]: bounds for name, bounds in job.bounds.items()},
+        {parameter_of(name): bounds for name, bounds in job.bounds.items()},
         {**{one.name: one.standard_error for one in found.parameters}, **scatter},
         [
             ModelOutput(
@@ -83,7 +84,7 @@ def _likely(job: Job, search: JointSearch, model: FittedModel, values: np.ndarra
     priors = search.joint.prior_records(model.effects)
     of_runs = OfRuns.among({name: at[name] for name in model.names})
     names, whole = of_runs.beside(model.names, covariance)
-    shared = [name for name in model.names if "[" not in name]
+    shared = [name for name in model.names if not is_of_run(name)]
     return LikelyModel(
         tuple(dict.fromkeys((*declared, *model.effects))),
         weight,

@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.model_fits import Search
+from smajax.core.names_of_runs import is_of_run, parameter_of
 from smajax.core.whiteness import split_runs
 from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
 from smajax.fit.outputs_of_runs import misfits
@@ -69,11 +70,11 @@ def with_other_runs(
     own = [name for name in problem.per_run.full_names if name not in names]
     if not own:
         return posterior
-    known = {name.split("[")[0]: one for name, one in setting.of_unknowns.items() if "[" in name}
-    ranges = {name.split("[")[0]: bounds for name, bounds in setting.bounds.items() if "[" in name}
+    known = {parameter_of(name): one for name, one in setting.of_unknowns.items() if is_of_run(name)}
+    ranges = {parameter_of(name): bounds for name, bounds in setting.bounds.items() if is_of_run(name)}
     widths = []
     for name in own:
-        kind = name.split("[")[0]
+        kind = parameter_of(name)
         at = float(values[problem.names.index(name)])
         prior = known.get(kind)
         low, high = ranges[kind]

@@ -8,6 +8,8 @@ from typing import TypeVar
 
 import numpy as np
 
+from smajax.core.names_of_runs import parameter_of
+
 Value = TypeVar("Value", float, np.ndarray)
 
 
@@ -58,7 +60,7 @@ def display(unit: str, quantity: str = "") -> Display:
     A strain is the one plain number that is read in per cent: `quantity`, its name, distinguishes it from the others. A run's own
     parameter is named `recoverable_strain[run]`.
     """
-    if unit in ("-", "1", "") and quantity.split("[")[0].endswith("strain"):
+    if unit in ("-", "1", "") and parameter_of(quantity).endswith("strain"):
         return _PERCENT
     return _SHOWN.get(unit) or Display(unit.replace("^2", "²").replace("^3", "³").replace("^4", "⁴"), 1.0)
 

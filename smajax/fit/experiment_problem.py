@@ -8,6 +8,7 @@ from types import MappingProxyType
 import jax.numpy as jnp
 import numpy as np
 
+from smajax.core.names_of_runs import of_run
 from smajax.core.parameters import parameter_values
 from smajax.data.experiment.record import Experiment, Prior, Run, Unknown
 from smajax.fit.base_model import base_model
@@ -20,7 +21,7 @@ def free_by_name(experiment: Experiment, runs: Sequence[Run]) -> dict[str, Unkno
     """Every unknown of these runs: `name`, or `name[run]` where it has one value for each run, those last."""
     shared = {unknown.name: unknown for unknown in experiment.unknowns if not unknown.per_run}
     per_run = {
-        f"{unknown.name}[{run.name}]": unknown for run in runs for unknown in experiment.unknowns if unknown.per_run
+        of_run(unknown.name, run.name): unknown for run in runs for unknown in experiment.unknowns if unknown.per_run
     }
     return {**shared, **per_run}
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import jax.numpy as jnp
 import numpy as np
 
+from smajax.core.names_of_runs import is_of_run, parameter_of
 from smajax.data.model_file.actuator_model import ActuatorModel
 from smajax.data.model_file.of_experiment import actuator_model, range_of, rounded
 from smajax.data.model_file.record import LikelyModel, ModelOutput
@@ -25,7 +26,7 @@ def identified_model(
     what these values scatter by as its error.
     """
     experiment = setup.experiment
-    shared = {name: value for name, value in fitted.values.items() if "[" not in name}
+    shared = {name: value for name, value in fitted.values.items() if not is_of_run(name)}
     of_runs = OfRuns.among(fitted.values)
     names, covariance = of_runs.beside(statistics.correlated, statistics.covariance)
     likely = LikelyModel(
@@ -43,7 +44,7 @@ def identified_model(
     return actuator_model(
         experiment,
         [likely],
-        {name.split("[")[0]: one for name, one in setup.bounds.items()},
+        {parameter_of(name): one for name, one in setup.bounds.items()},
         {
             **statistics.uncertainty.standard_error,
             **{name: variance**0.5 for name, variance in of_runs.scatter.items()},

@@ -31,6 +31,7 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Bool, Float, Int
 
+from smajax.core.names_of_runs import parameter_of
 from smajax.core.parameters import parameters
 from smajax.core.progress import BestFit, Progress, Stage, quiet
 from smajax.core.result_cache import ResultCache
@@ -300,7 +301,7 @@ def _best(
     task, table = tasks[k], parameters(problem.system)
     values = task.values_at(np.asarray(states[k].y)[: len(task.slots)])
     names = [problem.names[slot] for slot in task.slots]
-    units = {name: table[own].unit for name in names if (own := name.split("[")[0]) in table}
+    units = {name: table[own].unit for name in names if (own := parameter_of(name)) in table}
     found = {name: float(values[slot]) for name, slot in zip(names, task.slots, strict=True)}
     return BestFit(stage, found, units, tuple(errors[k].tolist()) if k in errors else ())
 

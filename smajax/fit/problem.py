@@ -12,6 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from smajax.core.names_of_runs import of_run
 from smajax.core.parameters import get_parameters, parameters, set_vector
 from smajax.data.experiment.record import Prior
 from smajax.fit.packed_runs import RunBatch, predict_batch
@@ -55,7 +56,7 @@ class PerRun(eqx.Module):
     @property
     def full_names(self) -> tuple[str, ...]:
         """`convection_coefficient[Step01]`, those of the first run first."""
-        return tuple(f"{name}[{run}]" for run in self.runs for name in self.names)
+        return tuple(of_run(name, run) for run in self.runs for name in self.names)
 
 
 class Problem(eqx.Module):

@@ -10,6 +10,7 @@ import numpy as np
 
 from smajax.core.display_units import correlation, digits, display, label
 from smajax.core.files import json_text, replace
+from smajax.core.names_of_runs import parameter_of
 from smajax.fit.directions import weak
 from smajax.fit.identify_result import Identified, IdentifiedOutput
 from smajax.report import identify_pictures as draw
@@ -174,7 +175,7 @@ def page(result: Identified, steps: Sequence[Step] = ()) -> str:
         ]
     parts += ["<h2>Runs</h2>", table(run_head, runs, range(2, len(run_head)))]
     if result.values_of_held_out_runs:
-        units = {one.name.split("[")[0]: display(one.unit, one.name) for one in result.estimates}
+        units = {parameter_of(one.name): display(one.unit, one.name) for one in result.estimates}
         own = [
             f"{name} {digits(units[name.split('[')[0]].of(value))} {units[name.split('[')[0]].unit}".strip()
             for name, value in result.values_of_held_out_runs.items()

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from smajax.core.names_of_runs import is_of_run, parameter_of
 from smajax.data.experiment.record import RUN_STARTS
 
 
@@ -24,15 +25,15 @@ class OfRuns(NamedTuple):
         """Of fitted values, those of single runs called `name[run]`."""
         values: dict[str, list[float]] = {}
         for name, value in fitted.items():
-            if "[" in name:
-                own = name.split("[")[0]
+            if is_of_run(name):
+                own = parameter_of(name)
                 values.setdefault(RUN_STARTS.get(own, own), []).append(value)
         means = {name: float(np.mean(many)) for name, many in values.items() if name}
         return cls(means, {name: float(np.var(values[name], ddof=1)) for name in means if len(values[name]) > 1})
 
     def beside(self, names: Sequence[str], covariance: np.ndarray) -> tuple[tuple[str, ...], np.ndarray]:
         """(names, covariance) of the shared ones among `names` with their `covariance` (K, K), and of these, independent of them."""
-        keep = [k for k, name in enumerate(names) if "[" not in name]
+        keep = [k for k, name in enumerate(names) if not is_of_run(name)]
         whole = np.zeros((len(keep) + len(self.scatter),) * 2)
         whole[: len(keep), : len(keep)] = covariance[np.ix_(keep, keep)]
         own = range(len(keep), len(whole))
