@@ -19,7 +19,6 @@ import numpy as np
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model
-from smajax.core.names_of_runs import of_run, parameter_of
 from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
 from smajax.fit.outputs_of_runs import misfits
 from smajax.fit.problem import Problem
@@ -110,12 +109,8 @@ def _steps(
 def _own(problem: Problem, names: Sequence[str], owner: np.ndarray) -> np.ndarray:
     """Of each of `names` the part of the runs whose own value it is, -1 of a shared one; `owner`: the part of each series."""
     part = owner[:: len(problem.batch.outputs)]
-    run_of = {
-        name: part[k]
-        for k, run in enumerate(problem.per_run.runs)
-        for name in names
-        if name == of_run(parameter_of(name), run)
-    }
+    of_runs = np.repeat(part, len(problem.per_run.names)).tolist()
+    run_of = dict(zip(problem.per_run.full_names, of_runs, strict=True))
     return np.asarray([run_of.get(name, -1) for name in names], dtype=int)
 
 

@@ -20,7 +20,7 @@ def _one_force(problem: Problem, lowest: float, highest: float) -> bool:
     own = {entry.name for entry in parameters(problem.system).values() if entry.path[0] == "load"}
     if own & {*batch.override_names, *problem.per_run.names}:
         return False  # runs have a load of their own
-    mask = _measured(problem)
+    mask = batch.measured
     if isinstance(load, AbstractMovingLoad):
         at = [
             np.broadcast_to(load.resistance(jnp.asarray(end), jnp.asarray(0.0), batch.inputs), mask.shape)
@@ -32,12 +32,6 @@ def _one_force(problem: Problem, lowest: float, highest: float) -> bool:
         return False
     forces = np.concatenate([np.abs(one[mask]) for one in at])
     return bool(np.ptp(forces) <= SAME_FORCE * forces.max())
-
-
-def _measured(problem: Problem) -> np.ndarray:
-    """Where a run has a sample of any output, (runs, N)."""
-    batch = problem.batch
-    return (np.asarray(batch.mask) > 0).reshape(batch.runs, len(batch.outputs), -1).any(axis=1)
 
 
 def _whole_way(problem: Problem, lowest: float, highest: float) -> tuple[float, float]:
@@ -63,6 +57,6 @@ def extent_of(problem: Problem) -> Extent:
     lowest, highest = (float(end([end(one) for one in readings])) for end in (np.min, np.max))
     ends = (lowest, highest) if which is not None else _whole_way(problem, lowest, highest)
     one_force = _one_force(problem, *ends)
-    seen = _measured(problem)
+    seen = batch.measured
     samples = seen.shape[1] - np.argmax(seen[:, ::-1], axis=1)  # to the last measured one
     return Extent(float(np.median(samples) * batch.dt), stroke, increment, lowest, highest, one_force)

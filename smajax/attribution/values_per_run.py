@@ -11,7 +11,6 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.model_fits import Search
-from smajax.core.names_of_runs import is_of_run, parameter_of
 from smajax.core.whiteness import split_runs
 from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
 from smajax.fit.outputs_of_runs import misfits
@@ -32,12 +31,9 @@ def on_runs(
         return problem.with_system(problem.system, batch), [one[index] for one in values]
     start = np.tile(np.asarray(own.start)[:1], (len(runs), 1))
     per_run = PerRun(own.names, tuple(runs), jnp.asarray(start))
-    bounds = {name: setting.bounds[f"{name.split('[')[0]}[{own.runs[0]}]"] for name in per_run.full_names}
-    priors = {
-        name: prior
-        for name in per_run.full_names
-        if (prior := setting.prior_records(presets=False).get(f"{name.split('[')[0]}[{own.runs[0]}]")) is not None
-    }
+    bounds = {name: setting.bounds[own.of_first_run(name)] for name in per_run.full_names}
+    records = setting.prior_records(presets=False)
+    priors = {name: prior for name in per_run.full_names if (prior := records.get(own.of_first_run(name))) is not None}
     there = problem.with_system(problem.system, batch, per_run, priors)
     points = []
     for one in values:
@@ -70,14 +66,12 @@ def with_other_runs(
     own = [name for name in problem.per_run.full_names if name not in names]
     if not own:
         return posterior
-    known = {parameter_of(name): one for name, one in setting.of_unknowns.items() if is_of_run(name)}
-    ranges = {parameter_of(name): bounds for name, bounds in setting.bounds.items() if is_of_run(name)}
     widths = []
     for name in own:
-        kind = parameter_of(name)
+        as_fitted = setting.problem.per_run.of_first_run(name)
         at = float(values[problem.names.index(name)])
-        prior = known.get(kind)
-        low, high = ranges[kind]
+        prior = setting.of_unknowns.get(as_fitted)
+        low, high = setting.bounds[as_fitted]
         widths.append(high - low if prior is None else prior.sigma * (at if prior.logarithmic else 1.0))
     jacobian = sensitivity(problem, values, [*names, *own]).jacobian
     columns = jacobian.reshape(-1, jacobian.shape[-1]) * np.concatenate([sizes, widths])

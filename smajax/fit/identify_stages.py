@@ -278,7 +278,7 @@ def _values_of_held_out_runs(setup: Setup, problem: Problem, values: np.ndarray,
     start = held_out.start_values()
     start[: len(held_out.shared)] = values[: len(held_out.shared)]
     free = held_out.per_run.full_names
-    boxes = {name: bounds[f"{name.split('[')[0]}[{problem.per_run.runs[0]}]"] for name in free}
+    boxes = {name: bounds[problem.per_run.of_first_run(name)] for name in free}
     settings = options.fit("fitting the values of held-out runs")
     fit = levenberg_marquardt(held_out, [held_out.task(free, boxes, start)], settings)[0]
     return {name: float(fit.values[held_out.names.index(name)]) for name in free}

@@ -41,6 +41,11 @@ class RunBatch(eqx.Module):
     def runs(self) -> int:
         return self.output.shape[0] // len(self.outputs)
 
+    @property
+    def measured(self) -> np.ndarray:
+        """Where a run has a sample of any output, (runs, N)."""
+        return (np.asarray(self.mask) > 0).reshape(self.runs, len(self.outputs), -1).any(axis=1)
+
 
 def pack(runs: Sequence[Run], dt: float, defaults: dict[str, float], integration: Integration = ONE_STEP) -> RunBatch:
     """Pack `runs` (all with the same channels). `defaults` holds a value for every parameter a run overrides.

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from smajax.core.names_of_runs import of_run
+from smajax.core.names_of_runs import of_run, parameter_of
 from smajax.core.parameters import get_parameters, parameters, set_vector
 from smajax.data.experiment.record import Prior
 from smajax.fit.packed_runs import RunBatch, predict_batch
@@ -57,6 +57,10 @@ class PerRun(eqx.Module):
     def full_names(self) -> tuple[str, ...]:
         """`convection_coefficient[Step01]`, those of the first run first."""
         return tuple(of_run(name, run) for run in self.runs for name in self.names)
+
+    def of_first_run(self, name: str) -> str:
+        """The same value in the first of these runs, whose bounds and prior are those of every run: of `name`, a value of any run."""
+        return of_run(parameter_of(name), self.runs[0])
 
 
 class Problem(eqx.Module):

@@ -11,7 +11,7 @@ from markupsafe import Markup
 
 from smajax.attribution.findings import Findings, ParameterFinding, Role, coverage, pooled_rmse
 from smajax.core.display_units import chance, correlation, digits, display, label, p_value, with_error
-from smajax.core.names_of_runs import parameter_of
+from smajax.core.names_of_runs import is_of_run, parameter_of
 from smajax.core.wording import and_listed, per_cent
 from smajax.fit.uncertainty import RemarkKind
 from smajax.report import pictures, run_plots
@@ -197,9 +197,7 @@ def _runs(findings: Findings) -> list[dict[str, Any]]:
 
 def _own_values(findings: Findings) -> list[str]:
     """Parameters with a value of each run's own."""
-    runs = [f"[{run.name}]" for run in findings.runs]
-    own = (parameter_of(one.name) for one in findings.after if any(one.name.endswith(run) for run in runs))
-    return list(dict.fromkeys(own))
+    return list(dict.fromkeys(parameter_of(one.name) for one in findings.after if is_of_run(one.name)))
 
 
 def _other_outputs(findings: Findings) -> list[dict[str, Any]]:

@@ -177,7 +177,7 @@ def page(result: Identified, steps: Sequence[Step] = ()) -> str:
     if result.values_of_held_out_runs:
         units = {parameter_of(one.name): display(one.unit, one.name) for one in result.estimates}
         own = [
-            f"{name} {digits(units[name.split('[')[0]].of(value))} {units[name.split('[')[0]].unit}".strip()
+            f"{name} {digits(units[parameter_of(name)].of(value))} {units[parameter_of(name)].unit}".strip()
             for name, value in result.values_of_held_out_runs.items()
         ]
         parts.append(

@@ -35,7 +35,7 @@ class Sought:
 def _states(system: System, batch: RunBatch) -> dict[str, np.ndarray]:
     """Every term's state at the samples of all runs, by the term's name."""
     run = simulate_batch(system, batch)
-    seen = (np.asarray(batch.mask) > 0).reshape(batch.runs, len(batch.outputs), -1).any(axis=1)
+    seen = batch.measured
     channels = {name: np.asarray(series) for name, series in batch.inputs.items()}
     own = dict(zip(batch.override_names, np.asarray(batch.overrides).T, strict=True))
     air = own.get("ambient_temperature", np.full(batch.runs, float(system.wire.heat.ambient_temperature)))

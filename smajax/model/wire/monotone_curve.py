@@ -2,7 +2,8 @@ r"""A monotone map of the reduced distance, the identity where nothing is stretc
 
 The cosine's range is cut into seven parts at `KNOTS`. Each is $e^s$ times as wide as in the cosine, where $s$ adds up from the
 middle part outwards: neighbours differ little, and the ends may reach far. All are then scaled so that a fifth and four fifths
-of the transformation stay where the cosine has them. Between knots the map is the monotone cubic of Fritsch and Butland (1984), beyond the last ones a straight line.
+of the transformation stay where the cosine has them. Between knots the map is the monotone cubic of Fritsch and Butland (1984), beyond the
+last ones a straight line.
 """
 
 from __future__ import annotations
@@ -17,7 +18,6 @@ from smajax.model.types import Scalar
 # Of the cosine's reduced distance: 4, 20, 40, 60, 80 and 96 % of the transformation lie before them.
 _BEFORE = (0.12818843369794988, 0.2951672353008665, 0.43590578315102513)
 KNOTS = (0.0, *_BEFORE, *(1.0 - one for one in reversed(_BEFORE)), 1.0)
-PARTS = 3  # on either side of the middle one
 _HELD = 2, 5  # knots that stay where they are
 
 
@@ -49,8 +49,8 @@ def moved_place(z: Scalar, before: Sequence[Scalar], after: Sequence[Scalar]) ->
     steeper = [1.0 / stretch[0] - 1.0, *inner, 1.0 / stretch[-1] - 1.0]  # its slope less 1
     moved = less[0] + steeper[0] * jnp.where(z < knots[0], z - knots[0], 0.0)
     moved = moved + steeper[-1] * jnp.where(z > knots[-1], z - knots[-1], 0.0)
-    for (left, wide), (low, high), (rising, falling) in zip(
-        zip(knots[:-1], width, strict=True), itertools.pairwise(less), itertools.pairwise(steeper), strict=True
+    for left, wide, (low, high), (rising, falling) in zip(
+        knots[:-1], width, itertools.pairwise(less), itertools.pairwise(steeper), strict=True
     ):
         share = (z - left) / wide
         t = jnp.where(share > 0.0, jnp.where(share > 1.0, 1.0, share), 0.0)
