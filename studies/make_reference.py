@@ -157,7 +157,8 @@ def effects() -> str:
         ]
         for name, effect in own.items():
             if effect.candidate.equation == equation:
-                named = "; where `[effects] only` names it" if effect.candidate.only_if_named else ""
+                group = effect.candidate.exclusive_group
+                named = f"; at most one of the {group}" if group else ""
                 lines.append(
                     f"| [`{name}`](#{effect.__module__}) | {effect.candidate.title} | {_cell(effect.candidate.formula)} | {odds_in_words(effect)}{named} |"
                 )

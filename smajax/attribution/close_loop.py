@@ -326,7 +326,7 @@ def findings_of(
     error_of = outcome.search.error_of
     before = parameters_found(job, setting, base, context.start, error_of(()))
     after = parameters_found(job, setting, final, context.start, error_of(final.effects)) if final.effects else before
-    effects = effects_found(job, setting, final, after, scored=not brief)
+    effects = effects_found(job, setting, final, after, outcome.search.detectable or None, scored=not brief)
     average = Averaged()
     if len(job.fit_runs) > 1 and not brief:  # else none can be left out, which the band is made of
         clocks = {run.name: len(run.time) for run in experiment.runs}

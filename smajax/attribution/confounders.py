@@ -36,8 +36,7 @@ def confounders(search: JointSearch, setting: Search, model: Model, runs: Sequen
     variance = search.error(fitted) ** 2
     here = fitted.log_evidence(variance)
     in_place = {effect: list(_in_place_of(search, own, effect)) for effect in own}
-    others = {other for likened in in_place.values() for other, _ in likened}
-    traces = traces_at(search.joint, fitted, search.extent, tuple(others))
+    traces = traces_at(search.joint, fitted, search.extent, search.detectable or None)  # by the search's programs
     found: list[Confounder] = []
     likely: list[tuple[int, FittedModel]] = []  # (place in `found`, model with a confounder that runs may separate)
     for effect, likened in in_place.items():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -45,7 +46,8 @@ def parameters_found(job: Job, setting: Search, model: Model, start: np.ndarray,
     names = [*setting.free(model.effects), *presets]
     index = job.problem.names.index
     own, slots = setting.restricted(model.effects)
-    problem = own.with_system(own.system, priors=setting.prior_records(presets=True)).with_noise(error)
+    priors = setting.prior_records(presets=True, effects=model.effects, width_factors=model.width_factors)
+    problem = own.with_system(own.system, priors=priors).with_noise(error)
     at: Sensitivity = sensitivity(problem, model.values[slots], names)
     values = {name: float(model.values[index(name)]) for name in names}
     known = uncertainty(at, names, values, job.bounds)
@@ -76,14 +78,19 @@ def _beside_prior(prior: CoefficientPrior | None, value: float) -> tuple[float |
 
 
 def effects_found(
-    job: Job, setting: Search, final: Model, after: ParametersFound, scored: bool = True
+    job: Job,
+    setting: Search,
+    final: Model,
+    after: ParametersFound,
+    looked_for: Sequence[str] | None = None,
+    scored: bool = True,
 ) -> tuple[EffectFinding, ...]:
     """Every candidate with its evidence: added ones first, the strongest of them at the head, then the likeliest.
 
-    `scored`: with the score of each that was not added.
+    `looked_for`: by the search; None: all. `scored`: with the score of each that was not added.
     """
     left = [name for name in job.candidates if name not in final.effects] if scored else []
-    last = {score.effects[0]: score for score in scores_at(setting, final, left)} if left else {}
+    last = {score.effects[0]: score for score in scores_at(setting, final, left, looked_for)} if left else {}
     fitted = {parameter.name: parameter for parameter in after.parameters}
     findings = []
     for name in job.candidates:

@@ -192,7 +192,10 @@ def _kept_at_half_step(
 
 
 def final_model(search: JointSearch, setting: Search, found: FittedModel, error: float) -> Model:
-    """A fitted model at its optimum by the runs alone: what is reported is no compromise with a prior."""
+    """A fitted model at its optimum by the runs alone: what is reported is no compromise with a prior.
+
+    But of effects whose priors say how smooth a shape is (`Candidate.keeps_priors`), and of the values of presets.
+    """
     best = refined(search, found, error)
     if not best.effects:
         return as_model(search, best, error)
@@ -200,7 +203,9 @@ def final_model(search: JointSearch, setting: Search, found: FittedModel, error:
     stage = "taking the model to the optimum of the runs"
     level = error / search.noise  # the cost counts noises here
     settled = SETTLED_COST * level**2
-    (fit,), _ = setting.fit([start], stage, enough=setting.config.final_convergence, settled=settled, level=level)
+    enough = setting.config.final_convergence
+    factors = best.width_factors
+    (fit,), _ = setting.fit([start], stage, enough=enough, settled=settled, level=level, width_factors=factors)
     search.fitted.setdefault(best.effects, best)
     return as_model(search, fitted_model(search.joint, best.effects, fit.values, best.effects), error)
 

@@ -74,7 +74,8 @@ def predicting(
     """A fitted model with its error on each run by the others; `noise` of a sample, SI, the rest as of `left_out`."""
     found = left_out(joint, fitted, error, program)
     rmse = float(np.sqrt((found.misfit**2).sum() / np.asarray(joint.problem.batch.mask).sum()))
-    return Model(fitted.effects, fitted.values, fitted.squares / noise**2, found.misfit, rmse, found.values)
+    cost, factors = fitted.squares / noise**2, fitted.width_factors
+    return Model(fitted.effects, fitted.values, cost, found.misfit, rmse, found.values, factors)
 
 
 def jackknife_error(values: np.ndarray) -> np.ndarray:

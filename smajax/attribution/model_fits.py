@@ -57,6 +57,7 @@ class Model:
     left_out: np.ndarray  # misfit (SI) of each fit run by the model fitted to the others, (R, N)
     left_out_rmse: float
     left_out_values: np.ndarray | None = None  # (parts, P): fitted without each part of the runs
+    width_factors: Mapping[str, float] = field(default_factory=dict)  # of the effects' priors (`laplace_evidence`)
 
 
 @dataclass
@@ -125,13 +126,29 @@ class Search:
         own = self.declared, self.of_unknowns
         return JointParameters.of(self.problem, self.unknowns, self.bounds, effects, self.extent, free, *own)
 
-    def prior_records(self, presets: bool, level: float = 1.0) -> dict[str, Prior]:
-        """Priors of unknowns, and of values of presets where these are free, for a fit whose misfit counts in noises.
+    def prior_records(
+        self,
+        presets: bool,
+        level: float = 1.0,
+        effects: Sequence[str] = (),
+        width_factors: Mapping[str, float] = MappingProxyType({}),
+    ) -> dict[str, Prior]:
+        """Priors for a fit whose misfit counts in noises: of unknowns, of values of presets where these are free, and of those `effects` that keep theirs.
 
         `level`: noises that an independent sample may be off by, beside which a prior counts as it would beside the noise alone.
+        `width_factors`: by how much those of effects are wider than their files say.
         """
         known = {**self.of_unknowns, **(self.presets if presets else {})}
-        return {name: Prior(one.base, one.sigma / level, one.logarithmic) for name, one in known.items()}
+        records = {name: Prior(one.base, one.sigma / level, one.logarithmic) for name, one in known.items()}
+        keeping = [name for name in effects if LIBRARY[name].candidate.keeps_priors and name in self.candidates]
+        if keeping:
+            joint = self.joint(keeping)
+            for effect in keeping:
+                for name in joint.coefficients[effect]:
+                    one = joint.priors[name]
+                    sigma = one.sigma * width_factors.get(effect, 1.0) / level
+                    records[name] = Prior(one.base, sigma, one.logarithmic)
+        return records
 
     def coefficients(self, effect: str) -> list[str]:
         return [name for name in self.problem.names if name.startswith(f"{effect}.")]
@@ -169,17 +186,18 @@ class Search:
         hops: bool = False,
         presets: bool = False,
         level: float = 1.0,
+        width_factors: Mapping[str, float] = MappingProxyType({}),
     ) -> tuple[list[Fit], np.ndarray]:
         """Fit every start: (fits with full parameter vectors, misfit of all runs at each, (S, R, N)).
 
         `enough`, `settled`: relative and absolute tolerance of the cost. `hops`: each from points near its end as well
         (`fit.starts.perturbed_restarts`). `presets`: whether values of presets are free, within their priors against the noise.
-        `level`: as of `prior_records`.
+        `level`, `width_factors`: as of `prior_records`.
         """
         enough = self.config.convergence if enough is None else enough
         freed = self.presets if presets else {}
         every = [name for start in starts for name in start.effects]
-        problem, index = self.restricted(every, self.prior_records(presets, level))
+        problem, index = self.restricted(every, self.prior_records(presets, level, every, width_factors))
         tasks = [
             problem.task([*self.free(start.effects), *freed], self.bounds, start.values[index], start.weights)
             for start in starts

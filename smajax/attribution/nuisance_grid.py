@@ -15,8 +15,10 @@ import numpy as np
 
 from smajax.attribution.model_fits import Model, Search, nudged
 from smajax.attribution.score_test import Score, ranked, samples_per_independent, score_of, switches, without
+from smajax.attribution.traces import by_program
 from smajax.fit.integration import with_integration
 from smajax.fit.outputs_of_runs import predicted_and_derivatives
+from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.model.effects.library import LIBRARY
 from smajax.simulation.steppers import ONE_STEP
@@ -31,54 +33,81 @@ class Scanned:
     looks: dict[str, int] = field(default_factory=dict)
 
 
-def scanned(setting: Search, values: np.ndarray, effects: Sequence[str], fitted: Sequence[str]) -> Scanned:
-    """Misfit and its derivatives at `values` (P,), where `fitted` are the loose parameters.
+def scanned(
+    setting: Search,
+    values: np.ndarray,
+    effects: Sequence[str],
+    fitted: Sequence[str],
+    present: Sequence[str] = (),
+    looked_for: Sequence[str] | None = None,
+) -> Scanned:
+    """Misfit and its derivatives at `values` (P,) of a model with the effects `present`, where `fitted` are the loose parameters.
 
-    `effects`, which are off, are each at the place whose trace promises most beside what the fitted parameters absorb.
+    `effects`, which are off, are each at the place whose trace promises most beside what the fitted parameters absorb. `looked_for`: as of
+    `by_program`.
     """
-    problem = with_integration(setting.problem, ONE_STEP)  # the program of the search's traces
-    at = sensitivity(problem, nudged(setting, values, effects), setting.every)
-    options = [
-        (effect, {f"{effect}.{name}": one for name, one in place.items()})
-        for effect in effects
-        for place in LIBRARY[effect].candidate.grid(setting.extent)
-    ]
-    if not options:
-        return Scanned(at)
-    index = setting.problem.names.index
-    points, towards, whose = [], [], []
-    for number, (effect, place) in enumerate(options):
-        here = nudged(setting, values, [effect])
-        for name, one in place.items():
-            here[index(name)] = np.clip(one, *setting.bounds[name])
-        for name in switches(effect):
-            points.append(here)
-            towards.append(np.eye(len(values))[[index(name)]])
-            whose.append((number, name))
-    _, slopes = predicted_and_derivatives(problem, np.stack(points), np.stack(towards))
-    columns = -problem.centred(slopes[:, 0]) / np.asarray(problem.noise)
-    jacobian = at.jacobian.copy()
-    found = Scanned(dataclasses.replace(at, jacobian=jacobian))
+    parts, traces, shared = [], [], list(fitted)
+    for together in by_program(effects, looked_for):
+        own, slots = setting.restricted((*present, *together))
+        problem = with_integration(own, ONE_STEP)  # the program of the search's traces
+        names = [*shared, *(name for effect in together for name in setting.coefficients(effect))]
+        parts.append(sensitivity(problem, nudged(setting, values, together)[slots], names))
+        traces += _at_places(setting, problem, slots, values, together)
+        shared = []  # once is enough
+    first = parts[0]
+    jacobian = np.concatenate([one.jacobian for one in parts], axis=-1)
+    at = Sensitivity(tuple(name for one in parts for name in one.names), first.misfit, jacobian, first.mask)
+    found = Scanned(at)
     basis, residual = without(at, fitted)
     correlation = samples_per_independent(at)
-    best = {effect: score_of((effect,), at, basis, residual, setting.bounds, correlation).gain for effect, _ in options}
-    for number, (effect, place) in enumerate(options):
+    best: dict[str, float] = {}
+    for effect, place, columns in traces:
+        if effect not in best:
+            best[effect] = score_of((effect,), at, basis, residual, setting.bounds, correlation).gain
         found.looks[effect] = found.looks.get(effect, 1) + 1
-        own = [(k, name) for k, (whom, name) in enumerate(whose) if whom == number]
-        rows = columns[[k for k, _ in own]]
-        there = Sensitivity(tuple(name for _, name in own), at.misfit, np.moveaxis(rows, 0, -1), at.mask)
+        there = Sensitivity(tuple(columns), at.misfit, np.stack(list(columns.values()), axis=-1), at.mask)
         score = score_of((effect,), there, basis, residual, setting.bounds, correlation)
         if score.gain > best[effect]:
             best[effect], found.place[effect] = score.gain, place
-            for k, name in own:
-                jacobian[..., at.names.index(name)] = columns[k]
+            for name, column in columns.items():
+                jacobian[..., at.names.index(name)] = column
     return found
 
 
-def scores_at(setting: Search, model: Model, left: Sequence[str]) -> list[Score]:
-    """Score tests of the effects not yet in `model`, at its fit, the largest gain first; having looked at several places counts against one."""
+def _at_places(
+    setting: Search, problem: Problem, slots: Sequence[int], values: np.ndarray, effects: Sequence[str]
+) -> list[tuple[str, dict[str, float], dict[str, np.ndarray]]]:
+    """(effect, a place of its grid, columns (series, N) of its switches there), by full names. `slots`: of the parameters of `problem` among all."""
+    found: list[tuple[str, dict[str, float], dict[str, np.ndarray]]] = []
+    points, towards = [], []
+    for effect in effects:
+        for grid in LIBRARY[effect].candidate.grid(setting.extent):
+            place = {f"{effect}.{name}": one for name, one in grid.items()}
+            here = nudged(setting, values, [effect])
+            for name, one in place.items():
+                here[setting.problem.names.index(name)] = np.clip(one, *setting.bounds[name])
+            found.append((effect, place, {}))
+            for name in switches(effect):
+                points.append(here[slots])
+                towards.append(np.eye(len(slots))[[problem.names.index(name)]])
+    if not points:
+        return []
+    _, slopes = predicted_and_derivatives(problem, np.stack(points), np.stack(towards))
+    columns = iter(-problem.centred(slopes[:, 0]) / np.asarray(problem.noise))
+    for effect, _, own in found:
+        own.update({name: next(columns) for name in switches(effect)})
+    return found
+
+
+def scores_at(
+    setting: Search, model: Model, left: Sequence[str], looked_for: Sequence[str] | None = None
+) -> list[Score]:
+    """Score tests of the effects not yet in `model`, at its fit, the largest gain first; having looked at several places counts against one.
+
+    `looked_for`: as of `by_program`.
+    """
     loose = setting.loose(model.effects, model.values)
-    looked = scanned(setting, model.values, left, loose)
+    looked = scanned(setting, model.values, left, loose, model.effects, looked_for)
     scores = ranked(looked.at, loose, left, setting.bounds)
     return [
         dataclasses.replace(score, p_value=min(1.0, score.p_value * looked.looks.get(score.effects[0], 1)))

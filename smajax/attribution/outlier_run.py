@@ -41,10 +41,11 @@ def outlier_runs(setting: Search, model: Model, names: Sequence[str]) -> tuple[O
     starts = [Start(model.effects, place, (everyone != run).astype(float)) for run in worst for place in places]
     stage = "leaving out each run for good"
     settled = SETTLED * float((whole**2).sum() / mask.sum()) / float(problem.noise_sigma) ** 2
-    fits, found = setting.fit(starts, stage, enough=FIRST, settled=settled, presets=True)
+    factors = model.width_factors
+    fits, found = setting.fit(starts, stage, enough=FIRST, settled=settled, presets=True, width_factors=factors)
     near = [k for k, start in enumerate(starts) if _near(setting, found[k], start, whole)]
     if near:
-        again, misfit = setting.fit([starts[k] for k in near], stage, hops=True, presets=True)
+        again, misfit = setting.fit([starts[k] for k in near], stage, hops=True, presets=True, width_factors=factors)
         for k, fit, one in zip(near, again, misfit, strict=True):
             fits[k], found[k] = fit, one
     outliers = []

@@ -20,7 +20,8 @@ LARGEST_STEP = 0.2  # of its range that an unknown moves to the start of a fit
 def starts(joint: JointParameters, subset: Subset, linear: LinearModel, traces: Traces) -> list[np.ndarray]:
     """Where a fit of a set may begin, (P,) each: new coefficients at their linear estimate, unknowns where they are and there too.
 
-    An effect with several local minima gives ranges of its coefficients (`Candidate.start_ranges`): it is tried all over them.
+    An effect with several local minima gives ranges of its coefficients (`Candidate.start_ranges`), all over which it is tried, or other
+    places (`Candidate.further_starts`).
     """
     slots, estimate = joint.slots, linear.estimate(subset)
     values = joint.without(traces.values, [variant.effect for variant in subset])
@@ -35,7 +36,7 @@ def starts(joint: JointParameters, subset: Subset, linear: LinearModel, traces: 
         moved[slots[name]] = np.clip(values[slots[name]] + np.clip(step, -most, most), low, high)
     points = [values, moved]
     for variant in new:
-        points += _all_over(joint, variant.effect, moved)
+        points += [*_all_over(joint, variant.effect, moved), *_further(joint, variant.effect, moved)]
     return [_off_bounds(joint, one) for one in points]
 
 
@@ -82,6 +83,18 @@ def _all_over(joint: JointParameters, effect: str, values: np.ndarray) -> list[n
     for drawn in logarithmic_points(ranges, PLACES):
         point = np.array(values)
         for name, value in drawn.items():
+            full = f"{effect}.{name}"
+            point[joint.slots[full]] = np.clip(value, *joint.bounds[full])
+        points.append(point)
+    return points
+
+
+def _further(joint: JointParameters, effect: str, values: np.ndarray) -> list[np.ndarray]:
+    """`values` with the switches of an effect at each of the other places that it names."""
+    points = []
+    for place in LIBRARY[effect].candidate.further_starts:
+        point = np.array(values)
+        for name, value in place.items():
             full = f"{effect}.{name}"
             point[joint.slots[full]] = np.clip(value, *joint.bounds[full])
         points.append(point)

@@ -21,6 +21,7 @@ import scipy  # its parts are imported when they are first used
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.traces import Traces, Variant
 from smajax.fit.uncertainty import at_bound
+from smajax.model.effects.library import LIBRARY
 
 Subset = frozenset[Variant]
 IMPOSSIBLE = 6.0  # standard errors on the wrong side of zero
@@ -59,6 +60,8 @@ class LinearModel:
         return self.cached[subset]
 
     def _log_evidence(self, subset: Subset) -> float:
+        if _excludes_itself(subset):
+            return -np.inf
         columns = self._columns(subset)
         try:
             factor = np.linalg.cholesky(self.gram[np.ix_(columns, columns)] + np.diag(self.precision[columns]))
@@ -161,6 +164,12 @@ def linear_model(joint: JointParameters, traces: Traces, variance: float, candid
         one_sided=np.asarray([joint.one_sided(name) for name in names], dtype=bool),
         log_odds=_odds(joint, places),
     )
+
+
+def _excludes_itself(subset: Subset) -> bool:
+    """Whether two effects of a set describe the same (`Candidate.exclusive_group`)."""
+    groups = [group for one in subset if (group := LIBRARY[one.effect].candidate.exclusive_group)]
+    return len(set(groups)) < len(groups)
 
 
 def _odds(joint: JointParameters, places: Mapping[Variant, object]) -> dict[Variant, float]:

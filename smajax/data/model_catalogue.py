@@ -131,14 +131,15 @@ def candidates(
 ) -> tuple[str, ...]:
     """Names of the effects that a search looks for: those that this system can show.
 
-    One that is a candidate only where it is named is among them where `only` names it.
+    None of a group of which the system has one already (`Candidate.exclusive_group`).
     `clocked`: whether the samples have times; where they have not, what is a matter of seconds is tried only if asked for.
     """
+    taken = {effect.candidate.exclusive_group for effect in system.effects} - {""}
     return tuple(
         name
         for name in applicable(system)
         if (clocked or not LIBRARY[name].candidate.needs_time or only is not None)
-        and (not LIBRARY[name].candidate.only_if_named or only is not None)
+        and LIBRARY[name].candidate.exclusive_group not in taken
         and name not in excluded
         and (only is None or name in only)
     )

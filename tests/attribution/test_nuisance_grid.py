@@ -8,13 +8,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from smajax.attribution.model_fits import Model, Search
+from smajax.attribution.model_fits import Model, Search, nudged
 from smajax.attribution.nuisance_grid import scanned, scores_at
 from smajax.attribution.run_extent import extent_of
 from smajax.core.parameters import parameters, set_parameters
 from smajax.core.result_cache import ResultCache
 from smajax.fit.packed_runs import RunBatch, simulate_batch
 from smajax.fit.problem import Problem
+from smajax.fit.sensitivity import sensitivity
 from smajax.model.extended import extended
 from smajax.model.presets import build
 
@@ -56,7 +57,7 @@ def test_a_draught_is_scanned_over_its_time(time: float, lasting: float) -> None
 
 
 def _gain_at_two_seconds(setting: Search, base: Model) -> float:
-    at = scanned(setting, base.values, ("radiation",), ()).at
+    at = sensitivity(setting.problem, nudged(setting, base.values, ("draught",)), ["draught.change"])
     column, residual = at.columns(["draught.change"])[:, 0], at.residual()
     return float((column @ residual) ** 2 / (column @ column) / (residual @ residual))
 

@@ -72,7 +72,7 @@ def _entry(effect: type[AbstractEffect]) -> dict[str, Any]:
         "equation": candidate.equation,
         "formula": candidate.formula,
         "meaning": candidate.sentence,
-        "only_if_named": candidate.only_if_named,
+        "exclusive_group": candidate.exclusive_group,
         "prior": {"class": candidate.prior_class, "odds": PRIOR_ODDS[candidate.prior_class]},
         "parameters": entries,
     }
@@ -89,8 +89,8 @@ def _text(effect: type[AbstractEffect]) -> str:
         f"  {candidate.title}: {candidate.formula}",
         f"  {candidate.sentence}",
     ]
-    if candidate.only_if_named:
-        lines.append("  `close-loop` looks for it only where the experiment file names it, under [effects] only.")
+    if candidate.exclusive_group:
+        lines.append(f"  At most one effect of this group is added: {candidate.exclusive_group}.")
     for name, entry in parameters(effect.base()).items():
         width = stated_width(effect, name.split(".", 1)[1])
         lines += [

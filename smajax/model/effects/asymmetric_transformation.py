@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate, Width
+from smajax.model.effects.candidate import TRANSFORMATION_SHAPE, Candidate, Width
 from smajax.model.types import Scalar
 from smajax.model.wire.kinetics_terms import ShapeTerm
 
@@ -37,6 +37,7 @@ class AsymmetricTransformation(AbstractEffect, ShapeTerm):
         switches=("heating", "cooling"),
         initial_guess={"heating": 0.2, "cooling": 0.2},
         prior_class="material",
+        exclusive_group=TRANSFORMATION_SHAPE,
         widths={
             "heating": Width(0.4, "calorimetry of NiTi: peaks with one steep and one slow side"),
             "cooling": Width(0.4, "calorimetry of NiTi: peaks with one steep and one slow side"),

@@ -25,6 +25,9 @@ PRIOR_CLASSES: tuple[str, ...] = get_args(PriorClass)
 # evidence thirty times as strong (3.5 in its natural logarithm) as a property of every wire.
 PRIOR_ODDS: Mapping[PriorClass, float] = MappingProxyType({"material": 0.1, "bench": 0.03, "event": 0.003})
 
+# `Candidate.exclusive_group` of the effects that change how the transformation runs through its range.
+TRANSFORMATION_SHAPE = "shape of the transformation"
+
 Scale = Literal["", "stroke", "increment", "run", "load", "1/run", "stroke/run"]
 SCALES: tuple[str, ...] = get_args(Scale)
 Origin = Literal["", "lowest", "highest"]
@@ -113,9 +116,11 @@ class Candidate:
     # Whether the load may stick and jump with it: then what a fit gains by it may be the integration's
     # (`attribution.step_size_check`).
     stick_slip: bool = False
-    # Whether the search looks for it only where the experiment file names it (`[effects] only`): one whose part in the search is
-    # not settled.
-    only_if_named: bool = False
+    # What it describes, where several effects describe the same in ways that exclude each other: no model has two of one group.
+    exclusive_group: str = ""
+    # Whether its priors take part in the fit whose values are reported as well: they say how smooth a shape is, which the runs alone
+    # do not determine.
+    keeps_priors: bool = False
     # Whether it can change anything of this wire, load and drive: a candidate that cannot is not looked at.
     applies: Callable[[Actuator], bool] = _always
     # Whether runs of that extent could show it: a candidate that they cannot is not looked at.
@@ -127,6 +132,8 @@ class Candidate:
     # Ranges of coefficients, positive, from all over which a refit begins where the misfit has many local minima; of
     # the switches as the score test has them.
     start_ranges: Callable[[Mapping[str, float]], dict[str, tuple[float, float]]] = _no_ranges
+    # Values of switches at which a refit may begin as well, where the misfit has other minima for other shapes.
+    further_starts: tuple[Mapping[str, float], ...] = ()
     # What is known before the runs: the odds that they need it (`PRIOR_ODDS`), and how large its coefficients are where
     # it is present. `prior_width.width_of` has the width of those that are not listed.
     prior_class: PriorClass = "bench"

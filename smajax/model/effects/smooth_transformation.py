@@ -8,7 +8,7 @@ import jax
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate, Width
+from smajax.model.effects.candidate import TRANSFORMATION_SHAPE, Candidate, Width
 from smajax.model.types import Scalar
 from smajax.model.wire.kinetics_terms import ShapeTerm
 
@@ -31,6 +31,7 @@ class SmoothTransformation(AbstractEffect, ShapeTerm):
         switches=("weight",),
         initial_guess={"weight": 0.3},
         prior_class="material",
+        exclusive_group=TRANSFORMATION_SHAPE,
         widths={
             "weight": Width(0.3, "calorimetry of NiTi: peaks with rounded ends"),
         },

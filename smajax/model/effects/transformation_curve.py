@@ -10,7 +10,7 @@ import numpy as np
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Actuator, Candidate, Width
+from smajax.model.effects.candidate import TRANSFORMATION_SHAPE, Actuator, Candidate, Width
 from smajax.model.types import Scalar
 from smajax.model.wire.kinetics_terms import PlaceTerm
 from smajax.model.wire.monotone_curve import moved_place
@@ -77,7 +77,9 @@ class TransformationCurve(AbstractEffect, PlaceTerm):
         switches=_ALL,
         initial_guess={name: 0.4 if name.endswith("outer") else 0.1 for name in _ALL},
         applies=_follows_the_cosine,
-        only_if_named=True,
+        exclusive_group=TRANSFORMATION_SHAPE,
+        keeps_priors=True,
+        further_starts=(dict.fromkeys(_ALL, 0.7), {name: 0.7 if name.endswith("outer") else -0.4 for name in _ALL}),
         prior_class="material",
         widths=dict.fromkeys(_ALL, _WIDTH),
     )

@@ -7,7 +7,7 @@ from typing import ClassVar
 import jax
 
 from smajax.core.parameters import parameter
-from smajax.model.effects.candidate import Candidate, Width
+from smajax.model.effects.candidate import TRANSFORMATION_SHAPE, Candidate, Width
 from smajax.model.effects.second_range import SWITCHES, AbstractSecondRange
 from smajax.model.types import Scalar
 
@@ -38,6 +38,7 @@ class TwoPartTransformation(AbstractSecondRange):
             "width": 0.8,
         },
         prior_class="material",
+        exclusive_group=TRANSFORMATION_SHAPE,
         widths={
             "heating_weight": Width(0.3, "grips, ends and grains of another orientation: some tenths of a wire"),
             "cooling_weight": Width(0.3, "grips, ends and grains of another orientation: some tenths of a wire"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from smajax.core.parameters import parameter
-from smajax.model.effects.candidate import Candidate, Extent, Width
+from smajax.model.effects.candidate import TRANSFORMATION_SHAPE, Candidate, Extent, Width
 from smajax.model.effects.second_range import SWITCHES, AbstractSecondRange
 from smajax.model.types import Scalar
 from smajax.model.wire.shape import Cosine
@@ -47,6 +47,7 @@ class TwoStepTransformation(AbstractSecondRange):
         },
         grid=_grid,
         prior_class="bench",
+        exclusive_group=TRANSFORMATION_SHAPE,
         widths={
             "heating_weight": Width(0.3, "a small share of the R-phase on heating, most of the strain in one step"),
             "cooling_weight": Width(0.3, "strain of the R-phase on cooling: a tenth to a third of the whole"),

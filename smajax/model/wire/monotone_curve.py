@@ -47,13 +47,13 @@ def moved_place(z: Scalar, before: Sequence[Scalar], after: Sequence[Scalar]) ->
         for (a, b), (one, other) in zip(itertools.pairwise(width), itertools.pairwise(stretch), strict=True)
     ]
     steeper = [1.0 / stretch[0] - 1.0, *inner, 1.0 / stretch[-1] - 1.0]  # its slope less 1
-    moved = less[0] + steeper[0] * jnp.where(z < knots[0], z - knots[0], 0.0)
-    moved = moved + steeper[-1] * jnp.where(z > knots[-1], z - knots[-1], 0.0)
+    moved = less[0] + steeper[0] * jnp.minimum(z - knots[0], 0.0) + steeper[-1] * jnp.maximum(z - knots[-1], 0.0)
     for left, wide, (low, high), (rising, falling) in zip(
         knots[:-1], width, itertools.pairwise(less), itertools.pairwise(steeper), strict=True
     ):
-        share = (z - left) / wide
-        t = jnp.where(share > 0.0, jnp.where(share > 1.0, 1.0, share), 0.0)
-        rest = 1.0 - t
-        moved = moved + (high - low) * t * t * (3.0 - 2.0 * t) + wide * t * rest * (rising * rest - falling * t)
+        # Hermite's cubic from `left` on, by powers: what is of the coefficients alone is computed once a run, and not in every step.
+        chord = (high - low) / wide
+        second, third = (3.0 * chord - 2.0 * rising - falling) / wide, (rising + falling - 2.0 * chord) / (wide * wide)
+        within = jnp.minimum(jnp.maximum(z - left, 0.0), wide)
+        moved = moved + within * (rising + within * (second + within * third))
     return z + moved
