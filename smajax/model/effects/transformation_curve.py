@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import ClassVar, NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -102,7 +104,7 @@ def branch_shape(values: Mapping[str, float], branch: str) -> BranchShape:
     # Dense about the middle, where a step may be sharp, and reaching as far as a tail.
     z = 0.5 + np.sinh(np.linspace(-1.0, 1.0, 20001) * np.arcsinh(reach * 50.0)) / 50.0
     in_cosine = 2.0 / np.pi * np.arcsin(np.sqrt(np.arange(11) / 10.0))
-    width = np.diff(np.interp(in_cosine, np.asarray(curve._moved(jnp.asarray(z), branch)), z))
+    width = np.diff(np.interp(in_cosine, np.asarray(jax.vmap(partial(curve._moved, branch=branch))(jnp.asarray(z))), z))
     usual = np.diff(in_cosine)
     between, usually = float(width[1:-1].sum()), float(usual[1:-1].sum())
     return BranchShape(

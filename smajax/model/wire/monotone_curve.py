@@ -12,6 +12,7 @@ import itertools
 from collections.abc import Sequence
 
 import jax.numpy as jnp
+import numpy as np
 
 from smajax.model.types import Scalar
 
@@ -19,6 +20,8 @@ from smajax.model.types import Scalar
 _BEFORE = (0.12818843369794988, 0.2951672353008665, 0.43590578315102513)
 KNOTS = (0.0, *_BEFORE, *(1.0 - one for one in reversed(_BEFORE)), 1.0)
 _HELD = 2, 5  # knots that stay where they are
+_COSINE = np.diff(KNOTS)
+_SHARES = _COSINE[_HELD[0] : _HELD[1]] / (KNOTS[_HELD[1]] - KNOTS[_HELD[0]])  # of the parts between those
 
 
 def moved_place(z: Scalar, before: Sequence[Scalar], after: Sequence[Scalar]) -> Scalar:
@@ -28,32 +31,31 @@ def moved_place(z: Scalar, before: Sequence[Scalar], after: Sequence[Scalar]) ->
     part next to it towards the middle, over the same in the cosine, -.
     """
     # The map less z is interpolated, so that it is zero to the bit where nothing is stretched. It is a sum over the parts, each
-    # of which stands still outside its own: rounding at a knot then makes no jump, as a choice of one part would.
-    cosine = [b - a for a, b in itertools.pairwise(KNOTS)]
-    outwards = [*reversed(list(itertools.accumulate(before))), None, *itertools.accumulate(after)]
-    relative = [jnp.ones_like(z) if s is None else jnp.exp(s) for s in outwards]
-    first, last = _HELD
-    between = [w * (r - 1.0) for w, r in zip(cosine[first:last], relative[first:last], strict=True)]
-    scale = 1.0 / (1.0 + sum(between[1:], between[0]) / (KNOTS[last] - KNOTS[first]))
-    stretch = [r * scale for r in relative]
-    width = [w * r for w, r in zip(cosine, stretch, strict=True)]
-    wider = [w * (r - 1.0) for w, r in zip(cosine, stretch, strict=True)]
-    down = list(itertools.accumulate(reversed(wider[:first]), initial=jnp.zeros_like(z)))
-    up = list(itertools.accumulate(wider[first:], initial=jnp.zeros_like(z)))
-    less = [*reversed(down), *(-one for one in up[1:])]  # the map less z, at the knots
-    knots = [u - d for u, d in zip(KNOTS, less, strict=True)]
-    inner = [
-        ((2.0 * b + a) * (1.0 - one) + (b + 2.0 * a) * (1.0 - other)) / ((2.0 * b + a) * one + (b + 2.0 * a) * other)
-        for (a, b), (one, other) in zip(itertools.pairwise(width), itertools.pairwise(stretch), strict=True)
-    ]
-    steeper = [1.0 / stretch[0] - 1.0, *inner, 1.0 / stretch[-1] - 1.0]  # its slope less 1
-    moved = less[0] + steeper[0] * jnp.minimum(z - knots[0], 0.0) + steeper[-1] * jnp.maximum(z - knots[-1], 0.0)
-    for left, wide, (low, high), (rising, falling) in zip(
-        knots[:-1], width, itertools.pairwise(less), itertools.pairwise(steeper), strict=True
-    ):
-        # Hermite's cubic from `left` on, by powers: what is of the coefficients alone is computed once a run, and not in every step.
-        chord = (high - low) / wide
-        second, third = (3.0 * chord - 2.0 * rising - falling) / wide, (rising + falling - 2.0 * chord) / (wide * wide)
-        within = jnp.minimum(jnp.maximum(z - left, 0.0), wide)
-        moved = moved + within * (rising + within * (second + within * third))
-    return z + moved
+    # of which stands still outside its own: rounding at a knot then makes no jump, as a choice of one part would. Arrays of all parts
+    # are an eighth of the operations to trace.
+    outwards = [*reversed(list(itertools.accumulate(before))), jnp.zeros_like(z), *itertools.accumulate(after)]
+    wider = jnp.expm1(jnp.stack(outwards))
+    between = _SHARES @ wider[_HELD[0] : _HELD[1]]
+    scale = 1.0 / (1.0 + between)
+    stretch, excess = (1.0 + wider) * scale, (wider - between) * scale  # `excess` is `stretch` less 1
+    width = _COSINE * stretch
+    parts = list(_COSINE * excess)
+    further = [jnp.zeros_like(z)]  # by how much each knot lies further right
+    for one in parts[_HELD[0] :]:
+        further.append(further[-1] + one)
+    for one in reversed(parts[: _HELD[0]]):
+        further.insert(0, further[0] - one)
+    knots = np.asarray(KNOTS) + jnp.stack(further)
+    left, right, one, other = width[:-1], width[1:], stretch[:-1], stretch[1:]
+    first, second = 2.0 * right + left, right + 2.0 * left
+    inner = -(first * excess[:-1] + second * excess[1:]) / (first * one + second * other)
+    # Slope of the map less 1 at the knots, and of the chord of each part.
+    slope = jnp.concatenate([-excess[:1] / stretch[:1], inner, -excess[-1:] / stretch[-1:]])
+    chord = -excess / stretch
+    rising, falling = slope[:-1], slope[1:]
+    # Hermite's cubic from the left knot on, by powers: what is of the coefficients alone is computed once a run, and not in every step.
+    square, cube = (3.0 * chord - 2.0 * rising - falling) / width, (rising + falling - 2.0 * chord) / (width * width)
+    within = jnp.clip(z - knots[:-1], 0.0, width)
+    inside = jnp.sum(within * (rising + within * (square + within * cube)))
+    beyond = slope[0] * jnp.minimum(z - knots[0], 0.0) + slope[-1] * jnp.maximum(z - knots[-1], 0.0)
+    return z - further[0] + inside + beyond
