@@ -27,6 +27,7 @@ from smajax.attribution.subset_evidence import LinearModel, Subset, linear_model
 from smajax.attribution.traces import Traces, Variant, traces_at
 from smajax.core.progress import Stage, part_of
 from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
+from smajax.fit.outputs_of_runs import made_ready
 from smajax.fit.starts import nearest
 from smajax.model.effects.candidate import Extent
 
@@ -252,8 +253,10 @@ def _fit(
     """Fit the sets, all side by side, from the present values and from where the linear model points to."""
     joint = search.joint
     begun: list[tuple[tuple[str, ...], np.ndarray]] = []
-    for program, its_sets in _grouped(search, [_effects(search, subset) for subset in sets]):
-        problem, index = joint.restricted(program)
+    groups = _grouped(search, [_effects(search, subset) for subset in sets])
+    restricted = [joint.restricted(program) for program, _ in groups]
+    made_ready([problem for problem, _ in restricted])
+    for (_, its_sets), (problem, index) in zip(groups, restricted, strict=True):
         here = [subset for subset in sets if _effects(search, subset) in its_sets]
         points = [starts(joint, subset, linear, traces) for subset in here]
         for subset, start in zip(here, nearest(problem.with_noise(error), points, index), strict=True):

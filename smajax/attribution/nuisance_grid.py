@@ -17,7 +17,7 @@ from smajax.attribution.model_fits import Model, Search, nudged
 from smajax.attribution.score_test import Score, ranked, samples_per_independent, score_of, switches, without
 from smajax.attribution.traces import by_program
 from smajax.fit.integration import with_integration
-from smajax.fit.outputs_of_runs import predicted_and_derivatives
+from smajax.fit.outputs_of_runs import made_ready, predicted_and_derivatives
 from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.model.effects.library import LIBRARY
@@ -47,9 +47,11 @@ def scanned(
     `by_program`.
     """
     parts, traces, shared = [], [], list(fitted)
-    for together in by_program(effects, looked_for):
-        own, slots = setting.restricted((*present, *together))
-        problem = with_integration(own, ONE_STEP)  # the program of the search's traces
+    programs = by_program(effects, looked_for)
+    restricted = [setting.restricted((*present, *together)) for together in programs]
+    problems = [with_integration(own, ONE_STEP) for own, _ in restricted]  # the programs of the search's traces
+    made_ready(problems)
+    for together, problem, (_, slots) in zip(programs, problems, restricted, strict=True):
         names = [*shared, *(name for effect in together for name in setting.coefficients(effect))]
         parts.append(sensitivity(problem, nudged(setting, values, together)[slots], names))
         traces += _at_places(setting, problem, slots, values, together)

@@ -15,7 +15,7 @@ import numpy as np
 from smajax.attribution.joint_parameters import NUDGE, JointParameters, residual_and_columns
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.fit.integration import with_integration
-from smajax.fit.outputs_of_runs import predicted_and_derivatives
+from smajax.fit.outputs_of_runs import made_ready, predicted_and_derivatives
 from smajax.fit.problem import Problem
 from smajax.model.effects.candidate import Extent
 from smajax.model.effects.library import LIBRARY
@@ -56,9 +56,11 @@ def traces_at(
     variants: dict[Variant, Mapping[str, np.ndarray]] = {}
     places: dict[Variant, Mapping[str, float]] = {}
     shared = joint.free([effect for effect in among if effect in present])
-    for together in by_program(absent):
-        problem, index = joint.restricted((*present, *together))
-        problem = with_integration(problem, ONE_STEP)
+    programs = by_program(absent)
+    restricted = [joint.restricted((*present, *together)) for together in programs]
+    problems = [with_integration(problem, ONE_STEP) for problem, _ in restricted]
+    made_ready(problems)
+    for together, problem, (_, index) in zip(programs, problems, restricted, strict=True):
         names = [*shared, *(name for effect in together for name in joint.coefficients[effect])]
         _, found = residual_and_columns(problem, _nudged(joint, values, together)[index], names)
         columns |= found

@@ -92,6 +92,11 @@ class Program:
         _warn(failure, "failed while it ran")
         return results
 
+    def wait(self) -> None:
+        """Until it is compiled, where that goes on beside the caller; what goes wrong there shows at the first call."""
+        if self.native is not None:
+            self.native.wait()
+
     def begin(
         self,
         model: Any,
@@ -150,10 +155,12 @@ def program(
     alone: bool = False,
     engine: Engine = "auto",
     devices: Sequence[jax.Device] = (),
+    beside: bool = False,
 ) -> Program:
     """`function(model, own)` compiled for models of this kind; `names` are those of the numbers that a run has of its own.
 
-    `alone`: for one run at a time. `devices`: where XLA would run it; under "auto" anything but a processor is XLA's.
+    `alone`: for one run at a time. `devices`: where XLA would run it; under "auto" anything but a processor is XLA's. `beside`: it is compiled beside
+    the caller, who waits for it at its first call, and may have others traced meanwhile.
     Raises, under "native" alone, what stands in the way of machine code: Unsupported for what has no translation,
     ImportError without llvmlite, and whatever else goes wrong. What the function itself raises is always raised.
     """
@@ -161,7 +168,7 @@ def program(
     if meant == "auto" and devices and devices[0].platform != "cpu":
         meant = "xla"
     key = (key_of(function, model, names), alone, meant)
-    return cached(_programs, key, lambda: _made(function, model, names, alone, meant))
+    return cached(_programs, key, lambda: _made(function, model, names, alone, meant, beside))
 
 
 @contextmanager
@@ -177,7 +184,7 @@ def _collector_paused() -> Iterator[None]:
 
 
 @_collector_paused()
-def _made(function: Function, model: Any, names: tuple[str, ...], alone: bool, engine: Engine) -> Program:
+def _made(function: Function, model: Any, names: tuple[str, ...], alone: bool, engine: Engine, beside: bool) -> Program:
     if engine == "xla":
         return Program(function, model, names, alone, None)
     traced = Traced(function, model, names)  # what goes wrong in here goes wrong by XLA too
@@ -188,7 +195,7 @@ def _made(function: Function, model: Any, names: tuple[str, ...], alone: bool, e
         # Imported here: the translator reads names of JAX that a release may move, and then XLA has to run all the same.
         from smajax.engine.native import NativeProgram
 
-        native = NativeProgram(traced, alone)
+        native = NativeProgram(traced, alone, beside)
     except Exception as error:
         if engine == "native":
             raise

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from typing import Any
 
 import equinox as eqx
@@ -23,22 +24,27 @@ MOST_SORTED = 6  # numbers of a run that are looked at for that
 class NativeProgram:
     """`function(model, own)` of one run as a function of whole arrays, for models with arrays of the same shapes."""
 
-    def __init__(self, traced: Traced, alone: bool) -> None:
-        """`alone`: for one run at a time. Raises Unsupported for what has no translation, and whatever LLVM raises."""
+    def __init__(self, traced: Traced, alone: bool, beside: bool = False) -> None:
+        """`alone`: for one run at a time. `beside`: compiled by another thread, for which the first call waits.
+
+        Raises Unsupported for what has no translation, and whatever LLVM raises: beside, at the first call.
+        """
         program = traced.program
         kinds = [str(aval.dtype) for aval in program.in_avals]
         dtypes = {*kinds, *(str(aval.dtype) for aval in program.out_avals)}
         own = [False] * traced.shared + [True] * len(traced.names)
         vectors = 1 if alone else VECTORS
         translated = translate(program, own, lanes_of(dtypes), divides_slowly(), vectors, mask_of(dtypes))
-        self._kernel = _kernel(translated)
+        self.scratch = translated.scratch  # memory that a thread works in, bytes
+        self._kernel = _begun(translated) if beside else _done(translated)
         self._tree, self._names, self._dtype = traced.tree, traced.names, traced.number
         self._shared = [np.dtype(kind) for kind in kinds[: traced.shared]]
 
-    @property
-    def scratch(self) -> int:
-        """Memory that a thread works in, bytes."""
-        return self._kernel.scratch
+    def wait(self) -> None:
+        """Until it is compiled, or that has failed."""
+        if not self._kernel.done():
+            with compiling():
+                wait([self._kernel])
 
     def __call__(self, model: Any, own: dict[str, np.ndarray], threads: int) -> Any:
         """What the function gives, every leaf with one row a run; `own` are arrays of shape (runs,)."""
@@ -49,7 +55,26 @@ class NativeProgram:
         order = alike([own[name] for name in self._names])
         values = [np.ascontiguousarray(own[name][order], dtype=self._dtype) for name in self._names]
         back = np.argsort(order)
-        return jax.tree.unflatten(self._tree, [one[back] for one in self._kernel(shared, values, threads)])
+        return jax.tree.unflatten(self._tree, [one[back] for one in self._kernel.result()(shared, values, threads)])
+
+
+def _done(translated: Translated) -> Future[Kernel]:
+    """Compiled now."""
+    made: Future[Kernel] = Future()
+    with compiling():
+        made.set_result(_kernel(translated))
+    return made
+
+
+def _begun(translated: Translated) -> Future[Kernel]:
+    """Compiled by another thread: LLVM lets Python go on."""
+    pool = ThreadPoolExecutor(1)
+    try:
+        coming = pool.submit(_kernel, translated)
+    except RuntimeError:  # no room for another thread under a cap on memory
+        return _done(translated)
+    pool.shutdown(wait=False)
+    return coming
 
 
 def _kernel(translated: Translated) -> Kernel:
@@ -57,8 +82,7 @@ def _kernel(translated: Translated) -> Kernel:
     key = cache.key_of(translated.text)
     code = cache.load(key)
     if code is None:
-        with compiling():
-            code = compiled(translated)
+        code = compiled(translated)
         cache.save(key, code)
     return Kernel(code, translated.lanes, translated.results, translated.scratch)
 

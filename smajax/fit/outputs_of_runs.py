@@ -135,6 +135,19 @@ def total_costs(problem: Problem, points: Sequence[np.ndarray] | np.ndarray) -> 
     return sums_of_squares(problem, rows) + prior
 
 
+def made_ready(problems: Sequence[Problem]) -> None:
+    """Compile what `predicted_and_derivatives` of these problems runs: each beside the tracing of the next."""
+    begun = []
+    for problem in problems if len(problems) > 1 else ():
+        nothing = np.zeros((1, len(problem.names)))
+        for number, run in enumerate(_runs(problem)):
+            at = _of_run(problem, nothing, number)
+            names = tuple({**_columns("value", at), **_columns("tangent", at)})
+            begun.append(program(_along, run, names, beside=True))
+    for one in begun:
+        one.wait()
+
+
 def predicted_and_derivatives(
     problem: Problem, points: np.ndarray, tangents: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
