@@ -23,7 +23,7 @@ from smajax.attribution.fit_programs import grouped
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.laplace_evidence import FittedModel, decomposed, fitted_model, independent_error
 from smajax.attribution.set_starts import at_usual_size, starts
-from smajax.attribution.subset_evidence import LinearModel, Subset, linear_model
+from smajax.attribution.subset_evidence import LinearModel, Subset, exclude_each_other, linear_model
 from smajax.attribution.traces import Traces, Variant, traces_at
 from smajax.core.progress import Stage, part_of
 from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
@@ -225,6 +225,8 @@ def _neighbours(search: JointSearch, linear: LinearModel, present: FittedModel, 
     """The present model without each of its effects, with the likeliest others in the place of each, and, while much is left, with the likeliest beside them.
 
     A sample may then be off by so much that the linear model tells effects hardly apart, and one that is far from linear comes late in it.
+    In the place of one of a group that exclude each other all others of the group are tried, whatever the linear model says: they describe the
+    same, and the farther they are from nothing the less a derivative there says of them.
     """
     here: Subset = frozenset(Variant(effect, -1) for effect in present.effects)
     others = [one for one in linear.places if one.effect not in present.effects]
@@ -237,6 +239,12 @@ def _neighbours(search: JointSearch, linear: LinearModel, present: FittedModel, 
         near += [here - {gone}, *likeliest(here - {gone})[:REPLACED]]
     near = [one for one in near if linear.log_evidence(one) > linear.log_evidence(here) - CERTAIN]
     near = sorted(near, key=lambda one: -linear.log_evidence(one))[:NEIGHBOURS]
+    alike: dict[tuple[str, ...], Subset] = {}
+    for gone in here:
+        for one in likeliest(here - {gone}):
+            if exclude_each_other({gone, *one}):
+                alike.setdefault(_effects(search, one), one)
+    near = list({_effects(search, one): one for one in (*near, *alike.values())}.values())
     near = [one for one in near if _fresh(search, _effects(search, one), error)]
     if error < UNEXPLAINED * search.noise:
         return near

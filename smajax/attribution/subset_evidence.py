@@ -12,7 +12,7 @@ M = J_S^T J_S/s^2 + \Lambda_S,\ b = J_S^T y/s^2$$
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -60,7 +60,7 @@ class LinearModel:
         return self.cached[subset]
 
     def _log_evidence(self, subset: Subset) -> float:
-        if _excludes_itself(subset):
+        if exclude_each_other(subset):
             return -np.inf
         columns = self._columns(subset)
         try:
@@ -166,7 +166,7 @@ def linear_model(joint: JointParameters, traces: Traces, variance: float, candid
     )
 
 
-def _excludes_itself(subset: Subset) -> bool:
+def exclude_each_other(subset: Collection[Variant]) -> bool:
     """Whether two effects of a set describe the same (`Candidate.exclusive_group`)."""
     groups = [group for one in subset if (group := LIBRARY[one.effect].candidate.exclusive_group)]
     return len(set(groups)) < len(groups)

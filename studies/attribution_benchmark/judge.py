@@ -12,15 +12,21 @@ from smajax.core.files import replace
 from smajax.model.effects.library import LIBRARY
 
 # What the library calls the generator's effects, where it calls them otherwise. Neither was written with the other in
-# view; some of the library's forms were widened after cases that it missed (README.md). The generator's smooth transformation, a share of the wire over a wider range, is the library's of two parts.
+# view; some of the library's forms were widened after cases that it missed (README.md). The generator's smooth transformation, a share of the wire over a wider range, is the library's of two parts. The curve of the transformation has all their shapes.
 CALLED: dict[str, tuple[str, ...]] = {
     "drive_dead_zone": ("dead_zone",),
     "supply_sag": ("supply_sag", "supply_memory"),
     "pwm": ("pwm_smoothing", "pulsed_voltage"),
     "stress_rate_share": ("enhanced_conditions", "liang_conditions"),
     "different_slopes": ("unequal_stress_slopes",),
-    "smooth_transformation": ("smooth_transformation", "two_step_transformation", "two_part_transformation"),
-    "two_part_transformation": ("two_step_transformation", "two_part_transformation"),
+    "smooth_transformation": (
+        "smooth_transformation",
+        "two_step_transformation",
+        "two_part_transformation",
+        "transformation_curve",
+    ),
+    "asymmetric_transformation": ("asymmetric_transformation", "transformation_curve"),
+    "two_part_transformation": ("two_step_transformation", "two_part_transformation", "transformation_curve"),
     "rate_dependence": ("lagging_transformation",),
     "transformation_drift": ("drifting_temperatures",),
     "coulomb_friction": ("coulomb_friction", "pulley_friction"),

@@ -37,3 +37,10 @@ def test_each_shape_has_its_words_on_its_own_branch(branch: str, values: dict[st
     of_branch, other = sentences if branch == "heating" else sentences[::-1]
     assert of_branch.split(" (")[0] == f"On {branch} the transformation {said}"
     assert "is like the cosine" in other
+
+
+def test_long_tails_of_both_branches_are_a_caution() -> None:
+    tails = {"heating_start_outer": 1.5, "cooling_finish_outer": 1.5}
+    *_, caution = curve_sentences(NAME, tails)
+    assert caution.startswith("Where long tails of heating and cooling overlap")
+    assert len(curve_sentences(NAME, {"heating_start_outer": 1.5})) == 2

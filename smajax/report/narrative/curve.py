@@ -9,13 +9,21 @@ from smajax.model.effects.transformation_curve import BranchShape, Transformatio
 
 # Times the cosine's: an end within this is like it, and one beyond the other is called a tail.
 LIKE_THE_COSINE, TAIL = 1.25, 2.5
+OVERLAP = (
+    "Where long tails of heating and cooling overlap, each small rise and fall of the temperature moves the martensite fraction a little "
+    "further: do not trust predictions of many small cycles without a run that has them."
+)
 
 
 def curve_sentences(effect_name: str, coefficients: Mapping[str, float]) -> tuple[str, ...]:
-    """What the fitted curve looks like, a sentence a branch; nothing of another effect."""
+    """What the fitted curve looks like, a sentence a branch and a caution about long tails; nothing of another effect."""
     if effect_name != TransformationCurve.effect_name:
         return ()
-    return tuple(_of_branch(branch, branch_shape(coefficients, branch)) for branch in ("heating", "cooling"))
+    shapes = {branch: branch_shape(coefficients, branch) for branch in ("heating", "cooling")}
+    sentences = tuple(_of_branch(branch, shape) for branch, shape in shapes.items())
+    if all(max(shape.first_tenth, shape.last_tenth) >= TAIL for shape in shapes.values()):
+        sentences += (OVERLAP,)
+    return sentences
 
 
 def _of_branch(branch: str, shape: BranchShape) -> str:
