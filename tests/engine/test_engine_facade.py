@@ -236,6 +236,26 @@ def test_an_unresolved_symbol_does_not_end_the_process(monkeypatch: pytest.Monke
 
 
 @pytest.mark.usefixtures("forgetful")
+def test_a_program_that_is_compiled_beside_gives_the_same_and_fails_as_any_other(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    values = np.arange(3.0)
+    monkeypatch.setattr(cache, "folder", lambda: None)
+    made = compiled_program(summed, jnp.asarray(1.0), ("a",), beside=True)
+    made.wait()
+    assert made.native is not None
+    np.testing.assert_allclose(made(jnp.asarray(1.0), {"a": values}), values + 1.0)
+    _programs.clear()
+    monkeypatch.setattr(native, "compiled", _fails("no machine"))
+    made = compiled_program(summed, jnp.asarray(1.0), ("a",), beside=True)
+    made.wait()
+    with pytest.warns(EngineWarning, match="RuntimeError: no machine"):
+        results = made(jnp.asarray(1.0), {"a": values})
+    np.testing.assert_allclose(results, values + 1.0)
+    assert made.native is None
+
+
+@pytest.mark.usefixtures("forgetful")
 def test_an_exception_of_the_function_is_raised_by_every_engine() -> None:
     def impossible(model: Any, own: dict[str, Any]) -> Any:
         raise KeyError("no such load")

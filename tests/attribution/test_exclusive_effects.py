@@ -1,0 +1,102 @@
+"""Effects that describe the same in other ways: no model has two, each is tried in the place of another, and a shape keeps its priors."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from smajax.attribution import joint_search, traces
+from smajax.attribution.joint_search import JointSearch
+from smajax.attribution.laplace_evidence import FittedModel, fitted_model
+from smajax.attribution.model_fits import Search
+from smajax.attribution.subset_evidence import LinearModel, exclude_each_other, linear_model
+from smajax.attribution.traces import Traces, Variant, traces_at
+from smajax.core.result_cache import ResultCache
+from smajax.data.model_catalogue import candidates
+from smajax.model.effects.library import LIBRARY
+from smajax.model.extended import extended
+from smajax.model.presets import build
+from tests.helpers.hot_weight import NOISE, UNKNOWNS, hot_weight
+
+SHAPES = ("transformation_curve", "smooth_transformation", "asymmetric_transformation", "two_part_transformation")
+AMONG = ("latent_heat", *SHAPES)
+
+
+@pytest.fixture(scope="module")
+def search() -> JointSearch:
+    return hot_weight({"asymmetric_transformation.heating": 0.6, "asymmetric_transformation.cooling": 0.4}, AMONG)
+
+
+def _linear(search: JointSearch, effects: tuple[str, ...]) -> tuple[FittedModel, LinearModel, Traces]:
+    model = fitted_model(search.joint, effects, search.joint.problem.start_values(), effects)
+    found = traces_at(search.joint, model, search.extent)
+    return model, linear_model(search.joint, found, (2.0 * NOISE) ** 2, AMONG), found
+
+
+def test_two_of_a_group_are_impossible_together(search: JointSearch) -> None:
+    _, linear, _ = _linear(search, ())
+    curve, smooth, latent = (
+        Variant(name, -1) for name in ("transformation_curve", "smooth_transformation", "latent_heat")
+    )
+    assert exclude_each_other({curve, smooth})
+    assert not exclude_each_other({curve, latent})
+    assert linear.log_evidence(frozenset({curve, smooth})) == -np.inf
+    assert np.isfinite(linear.log_evidence(frozenset({curve, latent})))
+    found = linear.climb(frozenset())
+    assert found
+    assert not exclude_each_other(found)
+
+
+def test_every_other_of_the_group_is_tried_in_the_place_of_one_whatever_the_linear_model_says(
+    search: JointSearch, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    present, linear, _ = _linear(search, ("smooth_transformation",))
+    monkeypatch.setattr(joint_search, "CERTAIN", -np.inf)  # it offers none
+    near = {joint_search._effects(search, one) for one in joint_search._neighbours(search, linear, present, NOISE)}
+    assert near == {(name,) for name in SHAPES if name != "smooth_transformation"}
+
+
+def test_traces_are_the_same_in_one_program_and_in_several(
+    search: JointSearch, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, _, several = _linear(search, ("latent_heat",))
+    assert len(traces.by_program((*SHAPES, "sensor_gain"))) == 2
+    monkeypatch.setattr(traces, "by_program", lambda effects, looked_for=None: [list(effects)])
+    _, _, one = _linear(search, ("latent_heat",))
+    assert several.columns.keys() == one.columns.keys()
+    for name, column in one.columns.items():
+        # In one program all others are switched on by next to nothing.
+        np.testing.assert_allclose(several.columns[name], column, atol=2e-3 * np.abs(column).max())
+
+
+def test_programs_of_what_is_not_looked_for_leave_those_of_the_search_alone() -> None:
+    effects = ("latent_heat", "smooth_transformation", "radiation", "asymmetric_transformation")
+    looked_for = ("latent_heat", "smooth_transformation")
+    assert traces.by_program(effects, looked_for) == [
+        ["latent_heat"],
+        ["smooth_transformation"],
+        ["radiation", "asymmetric_transformation"],
+    ]
+    assert traces.by_program(()) == [[]]
+
+
+def test_none_of_a_group_that_the_base_model_has_one_of_is_a_candidate() -> None:
+    base = build("flexinol_table_3_2", "dead_weight", "voltage")
+    assert set(SHAPES) <= set(candidates(base, None, ()))
+    knowing = extended(base, ("smooth_transformation",), {})
+    left = candidates(knowing, None, ("smooth_transformation",))
+    assert "latent_heat" in left
+    assert not any(LIBRARY[name].candidate.exclusive_group for name in left)
+
+
+def test_a_shape_keeps_its_priors_in_the_fit_that_is_reported_and_others_do_not(search: JointSearch) -> None:
+    joint = search.joint
+    setting = Search(joint.problem, UNKNOWNS, joint.bounds, AMONG, ResultCache())
+    records = setting.prior_records(
+        presets=False, level=2.0, effects=AMONG, width_factors={"transformation_curve": 1.5}
+    )
+    assert set(records) == set(joint.coefficients["transformation_curve"])
+    own = joint.priors["transformation_curve.heating_start_outer"]
+    record = records["transformation_curve.heating_start_outer"]
+    assert record.sigma == pytest.approx(own.sigma * 1.5 / 2.0)
+    assert record.mean == own.base
