@@ -86,9 +86,9 @@ axes[0].legend()
 plt.show()
 
 # %% [markdown]
-# The conclusion that the numbers support: the transformation is smooth and has two parts, a sharp core and long tails. Latent heat and a loss that
-# grows faster than the temperature (radiation, or a convection that rises) help, and may in part stand in for
-# something outside the library (that the smooth part ends at all of the transformation is not plausible). The error of the run of another day is seven times that of the fit runs, and no effect of the wire explains it.
+# The conclusion that the numbers support: the transformation does not follow the cosine. On heating it starts and ends with long tails, on cooling it starts smoothly and ends sharply. With this
+# curve neither latent heat nor a loss that grows faster than the temperature is needed. That the range changes with stress is as likely as not. What is left is ten times the noise. The error of the run of
+# another day is eight times that of the fit runs, and no effect of the wire explains it.
 
 # %%
 print(*report["unexplained"], sep="\n")
