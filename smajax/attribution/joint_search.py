@@ -19,11 +19,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from smajax.attribution.exclusive_effects import exclude_each_other, in_another_way
 from smajax.attribution.fit_programs import grouped
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.laplace_evidence import FittedModel, decomposed, fitted_model, independent_error
 from smajax.attribution.set_starts import at_usual_size, starts
-from smajax.attribution.subset_evidence import LinearModel, Subset, exclude_each_other, linear_model
+from smajax.attribution.subset_evidence import LinearModel, Subset, linear_model
 from smajax.attribution.traces import Traces, Variant, traces_at
 from smajax.core.progress import Stage, part_of
 from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
@@ -120,6 +121,7 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
     error = search.error(present)
     checked: set[tuple[str, ...]] = set()  # models whose effects were removed and replaced one by one
     left: set[tuple[str, ...]] = set()  # models that were the likeliest before
+    ended: list[FittedModel] = []  # models about which none is likelier
     for number in range(MOST_ROUNDS):
         search.joint = dataclasses.replace(search.joint, width_factors=present.width_factors)
         linear, traces = _linear(search, present, error)
@@ -149,8 +151,13 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
         if alike or (not moved and settled):
             explained = not present.effects and error < UNEXPLAINED * search.noise
             if last or explained or not search.thorough:
-                break
+                ended.append(present)
+                other = in_another_way(search.fitted.values(), ended, error, SETTLED_ODDS)
+                if explained or not search.thorough or other is None:
+                    break
+                present, error = other, search.error(other)
             checked.add(present.effects)
+    present = max([*ended, present], key=lambda model: model.log_evidence(error**2))
     search.winner = present.effects
     return present
 
@@ -242,8 +249,9 @@ def _neighbours(search: JointSearch, linear: LinearModel, present: FittedModel, 
     alike: dict[tuple[str, ...], Subset] = {}
     for gone in here:
         for one in likeliest(here - {gone}):
-            if exclude_each_other({gone, *one}):
-                alike.setdefault(_effects(search, one), one)
+            new = _effects(search, one)
+            if not exclude_each_other(new) and exclude_each_other({gone.effect, *set(new) - set(present.effects)}):
+                alike.setdefault(new, one)
     near = list({_effects(search, one): one for one in (*near, *alike.values())}.values())
     near = [one for one in near if _fresh(search, _effects(search, one), error)]
     if error < UNEXPLAINED * search.noise:

@@ -12,16 +12,16 @@ M = J_S^T J_S/s^2 + \Lambda_S,\ b = J_S^T y/s^2$$
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 import scipy  # its parts are imported when they are first used
 
+from smajax.attribution.exclusive_effects import exclude_each_other
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.traces import Traces, Variant
 from smajax.fit.uncertainty import at_bound
-from smajax.model.effects.library import LIBRARY
 
 Subset = frozenset[Variant]
 IMPOSSIBLE = 6.0  # standard errors on the wrong side of zero
@@ -60,7 +60,7 @@ class LinearModel:
         return self.cached[subset]
 
     def _log_evidence(self, subset: Subset) -> float:
-        if exclude_each_other(subset):
+        if exclude_each_other([one.effect for one in subset]):
             return -np.inf
         columns = self._columns(subset)
         try:
@@ -164,12 +164,6 @@ def linear_model(joint: JointParameters, traces: Traces, variance: float, candid
         one_sided=np.asarray([joint.one_sided(name) for name in names], dtype=bool),
         log_odds=_odds(joint, places),
     )
-
-
-def exclude_each_other(subset: Collection[Variant]) -> bool:
-    """Whether two effects of a set describe the same (`Candidate.exclusive_group`)."""
-    groups = [group for one in subset if (group := LIBRARY[one.effect].candidate.exclusive_group)]
-    return len(set(groups)) < len(groups)
 
 
 def _odds(joint: JointParameters, places: Mapping[Variant, object]) -> dict[Variant, float]:

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from smajax.attribution.exclusive_effects import of_groups
 from smajax.attribution.joint_parameters import NUDGE, JointParameters, residual_and_columns
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.fit.integration import with_integration
@@ -82,7 +83,7 @@ def by_program(effects: Sequence[str], looked_for: Sequence[str] | None = None) 
     have a program of their own too, so that the others share the search's; `looked_for`: None for all.
     """
     among = effects if looked_for is None else [effect for effect in effects if effect in looked_for]
-    apart = [effect for effect in among if LIBRARY[effect].candidate.exclusive_group]
+    apart = list(of_groups(among))
     others = [effect for effect in among if effect not in apart]
     rest = [effect for effect in effects if effect not in among]
     return [one for one in (others, apart, rest) if one] or [[]]

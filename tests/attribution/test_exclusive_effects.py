@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from smajax.attribution import joint_search, traces
+from smajax.attribution.exclusive_effects import exclude_each_other, in_another_way
 from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model
 from smajax.attribution.model_fits import Search
-from smajax.attribution.subset_evidence import LinearModel, exclude_each_other, linear_model
+from smajax.attribution.subset_evidence import LinearModel, linear_model
 from smajax.attribution.traces import Traces, Variant, traces_at
 from smajax.core.result_cache import ResultCache
 from smajax.data.model_catalogue import candidates
@@ -38,13 +39,13 @@ def test_two_of_a_group_are_impossible_together(search: JointSearch) -> None:
     curve, smooth, latent = (
         Variant(name, -1) for name in ("transformation_curve", "smooth_transformation", "latent_heat")
     )
-    assert exclude_each_other({curve, smooth})
-    assert not exclude_each_other({curve, latent})
+    assert exclude_each_other({"transformation_curve", "smooth_transformation"})
+    assert not exclude_each_other({"transformation_curve", "latent_heat"})
     assert linear.log_evidence(frozenset({curve, smooth})) == -np.inf
     assert np.isfinite(linear.log_evidence(frozenset({curve, latent})))
     found = linear.climb(frozenset())
     assert found
-    assert not exclude_each_other(found)
+    assert not exclude_each_other({one.effect for one in found})
 
 
 def test_every_other_of_the_group_is_tried_in_the_place_of_one_whatever_the_linear_model_says(
@@ -54,6 +55,10 @@ def test_every_other_of_the_group_is_tried_in_the_place_of_one_whatever_the_line
     monkeypatch.setattr(joint_search, "CERTAIN", -np.inf)  # it offers none
     near = {joint_search._effects(search, one) for one in joint_search._neighbours(search, linear, present, NOISE)}
     assert near == {(name,) for name in SHAPES if name != "smooth_transformation"}
+    beside, linear, _ = _linear(search, ("latent_heat", "smooth_transformation"))
+    sets = joint_search._neighbours(search, linear, beside, NOISE)
+    assert sets
+    assert not any(exclude_each_other([each.effect for each in one]) for one in sets)
 
 
 def test_traces_are_the_same_in_one_program_and_in_several(
@@ -100,3 +105,14 @@ def test_a_shape_keeps_its_priors_in_the_fit_that_is_reported_and_others_do_not(
     record = records["transformation_curve.heating_start_outer"]
     assert record.sigma == pytest.approx(own.sigma * 1.5 / 2.0)
     assert record.mean == own.base
+
+
+def test_a_model_as_likely_with_another_shape_is_searched_around_as_well(search: JointSearch) -> None:
+    values = search.joint.problem.start_values()
+    one, other = (fitted_model(search.joint, (name,), values, (name,)) for name in ("smooth_transformation", SHAPES[2]))
+    latent = fitted_model(search.joint, ("latent_heat",), values, ("latent_heat",))
+    ahead = one.log_evidence(NOISE**2) - other.log_evidence(NOISE**2)
+    assert in_another_way([one, other, latent], [one], NOISE, ahead + 0.1) is other
+    assert in_another_way([one, other, latent], [one], NOISE, ahead - 0.1) is None
+    assert in_another_way([one, other, latent], [other, one], NOISE, 1e9) is None
+    assert in_another_way([one, other, latent], [latent], NOISE, 1e9) is None

@@ -1,0 +1,32 @@
+"""Effects that describe the same in ways that exclude each other (`Candidate.exclusive_group`): no model has two of one group."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+
+from smajax.attribution.laplace_evidence import FittedModel
+from smajax.model.effects.library import LIBRARY
+
+
+def of_groups(effects: Iterable[str]) -> tuple[str, ...]:
+    """Those of `effects` that are of a group."""
+    return tuple(effect for effect in effects if LIBRARY[effect].candidate.exclusive_group)
+
+
+def exclude_each_other(effects: Collection[str]) -> bool:
+    """Whether two of them are of one group."""
+    groups = [LIBRARY[effect].candidate.exclusive_group for effect in of_groups(effects)]
+    return len(set(groups)) < len(groups)
+
+
+def in_another_way(
+    fitted: Iterable[FittedModel], ended: Sequence[FittedModel], error: float, odds: float
+) -> FittedModel | None:
+    """The likeliest fitted model that has other effects of groups than all of `ended`, if it is within log `odds` of the last of these.
+
+    It may need other effects beside it. `error`: of an independent sample, SI.
+    """
+    known, last = [of_groups(one.effects) for one in ended], ended[-1].log_evidence(error**2)
+    others = [one for one in fitted if known[-1] and of_groups(one.effects) and of_groups(one.effects) not in known]
+    best = max(others, key=lambda one: one.log_evidence(error**2), default=None)
+    return best if best is not None and best.log_evidence(error**2) > last - odds else None
