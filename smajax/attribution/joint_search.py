@@ -246,13 +246,9 @@ def _neighbours(search: JointSearch, linear: LinearModel, present: FittedModel, 
         near += [here - {gone}, *likeliest(here - {gone})[:REPLACED]]
     near = [one for one in near if linear.log_evidence(one) > linear.log_evidence(here) - CERTAIN]
     near = sorted(near, key=lambda one: -linear.log_evidence(one))[:NEIGHBOURS]
-    alike: dict[tuple[str, ...], Subset] = {}
-    for gone in here:
-        for one in likeliest(here - {gone}):
-            new = _effects(search, one)
-            if not exclude_each_other(new) and exclude_each_other({gone.effect, *set(new) - set(present.effects)}):
-                alike.setdefault(new, one)
-    near = list({_effects(search, one): one for one in (*near, *alike.values())}.values())
+    alike = [here - {gone} | {one} for gone in here for one in others if exclude_each_other((gone.effect, one.effect))]
+    alike.sort(key=linear.log_evidence)  # of several places of an effect the last one counts
+    near = list({_effects(search, one): one for one in (*near, *alike)}.values())
     near = [one for one in near if _fresh(search, _effects(search, one), error)]
     if error < UNEXPLAINED * search.noise:
         return near
