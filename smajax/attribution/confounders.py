@@ -36,7 +36,9 @@ def confounders(search: JointSearch, setting: Search, model: Model, runs: Sequen
     variance = search.error(fitted) ** 2
     here = fitted.log_evidence(variance)
     in_place = {effect: list(_in_place_of(search, own, effect)) for effect in own}
-    traces = traces_at(search.joint, fitted, search.extent, search.detectable or None)  # by the search's programs
+    others = {other for likened in in_place.values() for other, _ in likened}
+    looked_for = search.detectable or tuple(search.joint.coefficients)  # by the search's programs
+    traces = traces_at(search.joint, fitted, search.extent, (*looked_for, *others), looked_for)
     found: list[Confounder] = []
     likely: list[tuple[int, FittedModel]] = []  # (place in `found`, model with a confounder that runs may separate)
     for effect, likened in in_place.items():

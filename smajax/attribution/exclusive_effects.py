@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable
 
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.model.effects.library import LIBRARY
@@ -20,13 +20,13 @@ def exclude_each_other(effects: Collection[str]) -> bool:
 
 
 def in_another_way(
-    fitted: Iterable[FittedModel], ended: Sequence[FittedModel], error: float, odds: float
+    fitted: Iterable[FittedModel], present: FittedModel, known: Collection[tuple[str, ...]], error: float, odds: float
 ) -> FittedModel | None:
-    """The likeliest fitted model that has other effects of groups than all of `ended`, if it is within log `odds` of the last of these.
+    """The likeliest fitted model with effects of groups that are none of `known`, if it is within log `odds` of `present`, which has such effects too.
 
     It may need other effects beside it. `error`: of an independent sample, SI.
     """
-    known, last = [of_groups(one.effects) for one in ended], ended[-1].log_evidence(error**2)
-    others = [one for one in fitted if known[-1] and of_groups(one.effects) and of_groups(one.effects) not in known]
+    here, least = of_groups(present.effects), present.log_evidence(error**2) - odds
+    others = [one for one in fitted if here and of_groups(one.effects) and of_groups(one.effects) not in known]
     best = max(others, key=lambda one: one.log_evidence(error**2), default=None)
-    return best if best is not None and best.log_evidence(error**2) > last - odds else None
+    return best if best is not None and best.log_evidence(error**2) > least else None

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from smajax.attribution.exclusive_effects import exclude_each_other, in_another_way
+from smajax.attribution.exclusive_effects import exclude_each_other, in_another_way, of_groups
 from smajax.attribution.fit_programs import grouped
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.laplace_evidence import FittedModel, decomposed, fitted_model, independent_error
@@ -122,6 +122,7 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
     checked: set[tuple[str, ...]] = set()  # models whose effects were removed and replaced one by one
     left: set[tuple[str, ...]] = set()  # models that were the likeliest before
     ended: list[FittedModel] = []  # models about which none is likelier
+    shapes: set[tuple[str, ...]] = set()  # effects of groups of these, and of what was searched around in their place
     for number in range(MOST_ROUNDS):
         search.joint = dataclasses.replace(search.joint, width_factors=present.width_factors)
         linear, traces = _linear(search, present, error)
@@ -151,13 +152,15 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
         if alike or (not moved and settled):
             explained = not present.effects and error < UNEXPLAINED * search.noise
             if last or explained or not search.thorough:
-                ended.append(present)
-                other = in_another_way(search.fitted.values(), ended, error, SETTLED_ODDS)
+                shapes.add(of_groups(present.effects))
+                other = in_another_way(search.fitted.values(), present, shapes, error, SETTLED_ODDS)
                 if explained or not search.thorough or other is None:
                     break
+                ended, shapes = [*ended, present], shapes | {of_groups(other.effects)}
                 present, error = other, search.error(other)
             checked.add(present.effects)
     present = max([*ended, present], key=lambda model: model.log_evidence(error**2))
+    search.joint = dataclasses.replace(search.joint, width_factors=present.width_factors)
     search.winner = present.effects
     return present
 
@@ -232,8 +235,7 @@ def _neighbours(search: JointSearch, linear: LinearModel, present: FittedModel, 
     """The present model without each of its effects, with the likeliest others in the place of each, and, while much is left, with the likeliest beside them.
 
     A sample may then be off by so much that the linear model tells effects hardly apart, and one that is far from linear comes late in it.
-    In the place of one of a group that exclude each other all others of the group are tried, whatever the linear model says: they describe the
-    same, and the farther they are from nothing the less a derivative there says of them.
+    In the place of one of a group all others of it are tried: the farther they are from nothing the less a derivative there says of them.
     """
     here: Subset = frozenset(Variant(effect, -1) for effect in present.effects)
     others = [one for one in linear.places if one.effect not in present.effects]

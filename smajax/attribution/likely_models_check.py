@@ -83,4 +83,5 @@ def _without_one(search: JointSearch, model: FittedModel) -> FittedModel | None:
 
 def _as_model(search: JointSearch, fitted: FittedModel) -> Model:
     """A fitted model as the step-size check takes it: no run was left out."""
-    return Model(fitted.effects, fitted.values, fitted.squares / search.noise**2, np.zeros((0, 0)), float("nan"))
+    cost, none = fitted.squares / search.noise**2, np.zeros((0, 0))
+    return Model(fitted.effects, fitted.values, cost, none, float("nan"), width_factors=fitted.width_factors)

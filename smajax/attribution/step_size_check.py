@@ -39,7 +39,7 @@ def gain_kept_at_half_step(setting: Search, new: Model, old: Model) -> float:
         for effect in jumping:
             for name in setting.coefficients(effect):
                 values[setting.problem.names.index(name)] = base_value(name)
-        _, (left,) = setting.fit([Start(partner, values)], "checking at half the step")
+        _, (left,) = setting.fit([Start(partner, values)], "checking at half the step", width_factors=new.width_factors)
         without = min(without, float(np.sum((left / np.asarray(setting.problem.noise)) ** 2)))
     problem, index = setting.restricted(new.effects)
     fine = problem.with_system(problem.system, _finer(problem.batch), problem.per_run)

@@ -43,11 +43,15 @@ class Traces:
 
 
 def traces_at(
-    joint: JointParameters, model: FittedModel, extent: Extent, candidates: Sequence[str] | None = None
+    joint: JointParameters,
+    model: FittedModel,
+    extent: Extent,
+    candidates: Sequence[str] | None = None,
+    looked_for: Sequence[str] | None = None,
 ) -> Traces:
     """Residual of a fitted model and derivatives there; effects that are off are switched on by `NUDGE` for theirs.
 
-    `candidates`: effects that are looked at beside those of the model; None: all. Derivatives by one step of the integration a
+    `candidates`: effects that are looked at beside those of the model; None: all. `looked_for`: as of `by_program`. Derivatives by one step of the integration a
     sample: they only say which sets of effects are worth a fit.
     """
     values, present = model.values, model.effects
@@ -57,7 +61,7 @@ def traces_at(
     variants: dict[Variant, Mapping[str, np.ndarray]] = {}
     places: dict[Variant, Mapping[str, float]] = {}
     shared = joint.free([effect for effect in among if effect in present])
-    programs = by_program(absent)
+    programs = by_program(absent, looked_for)
     restricted = [joint.restricted((*present, *together)) for together in programs]
     problems = [with_integration(problem, ONE_STEP) for problem, _ in restricted]
     made_ready(problems)

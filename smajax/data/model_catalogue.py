@@ -131,7 +131,7 @@ def candidates(
 ) -> tuple[str, ...]:
     """Names of the effects that a search looks for: those that this system can show.
 
-    None of a group of which the system has one already (`Candidate.exclusive_group`).
+    None of a group of which the system has one already (`Candidate.exclusive_group`), unless `only` names it.
     `clocked`: whether the samples have times; where they have not, what is a matter of seconds is tried only if asked for.
     """
     taken = {effect.candidate.exclusive_group for effect in system.effects} - {""}
@@ -139,7 +139,7 @@ def candidates(
         name
         for name in applicable(system)
         if (clocked or not LIBRARY[name].candidate.needs_time or only is not None)
-        and LIBRARY[name].candidate.exclusive_group not in taken
+        and (LIBRARY[name].candidate.exclusive_group not in taken or only is not None)
         and name not in excluded
         and (only is None or name in only)
     )

@@ -112,7 +112,18 @@ def test_a_model_as_likely_with_another_shape_is_searched_around_as_well(search:
     one, other = (fitted_model(search.joint, (name,), values, (name,)) for name in ("smooth_transformation", SHAPES[2]))
     latent = fitted_model(search.joint, ("latent_heat",), values, ("latent_heat",))
     ahead = one.log_evidence(NOISE**2) - other.log_evidence(NOISE**2)
-    assert in_another_way([one, other, latent], [one], NOISE, ahead + 0.1) is other
-    assert in_another_way([one, other, latent], [one], NOISE, ahead - 0.1) is None
-    assert in_another_way([one, other, latent], [other, one], NOISE, 1e9) is None
-    assert in_another_way([one, other, latent], [latent], NOISE, 1e9) is None
+    known = {one.effects}
+    assert in_another_way([one, other, latent], one, known, NOISE, ahead + 0.1) is other
+    assert in_another_way([one, other, latent], one, known, NOISE, ahead - 0.1) is None
+    assert in_another_way([one, other, latent], one, {one.effects, other.effects}, NOISE, 1e9) is None
+    assert in_another_way([one, other, latent], latent, {()}, NOISE, 1e9) is None
+
+
+def test_each_shape_is_searched_around_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(joint_search, "SETTLED_ODDS", 1e9)  # all are as likely
+    search = hot_weight({"asymmetric_transformation.heating": 0.6, "asymmetric_transformation.cooling": 0.4}, AMONG[:4])
+    model = joint_search.search_jointly(search, {(): search.joint.problem.start_values()})
+    assert len(search.rounds) < joint_search.MOST_ROUNDS
+    best = max(search.fitted.values(), key=lambda one: one.log_evidence(search.error(model) ** 2))
+    assert model.effects == best.effects
+    assert search.joint.width_factors == model.width_factors
