@@ -1,4 +1,4 @@
-"""Effects that describe the same in ways that exclude each other (`Candidate.exclusive_group`): no model has two of one group."""
+"""Effects that describe the same in ways that exclude each other (`Candidate.exclusive_group`): no model of the search has two of one group."""
 
 from __future__ import annotations
 

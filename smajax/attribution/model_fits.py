@@ -142,12 +142,10 @@ class Search:
         records = {name: Prior(one.base, one.sigma / level, one.logarithmic) for name, one in known.items()}
         keeping = [name for name in effects if LIBRARY[name].candidate.keeps_priors and name in self.candidates]
         if keeping:
-            joint = self.joint(keeping)
-            for effect in keeping:
-                for name in joint.coefficients[effect]:
-                    one = joint.priors[name]
-                    sigma = one.sigma * width_factors.get(effect, 1.0) / level
-                    records[name] = Prior(one.base, sigma, one.logarithmic)
+            joint = dataclasses.replace(self.joint(keeping), width_factors=width_factors)
+            own = joint.prior_records(keeping)
+            for name in (name for effect in keeping for name in joint.coefficients[effect]):
+                records[name] = dataclasses.replace(own[name], sigma=own[name].sigma / level)
         return records
 
     def coefficients(self, effect: str) -> list[str]:

@@ -17,7 +17,7 @@ from smajax.attribution.model_fits import Model, Search, nudged
 from smajax.attribution.score_test import Score, ranked, samples_per_independent, score_of, switches, without
 from smajax.attribution.traces import by_program
 from smajax.fit.integration import with_integration
-from smajax.fit.outputs_of_runs import made_ready, predicted_and_derivatives
+from smajax.fit.outputs_of_runs import made_ready, slopes_at
 from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.model.effects.library import LIBRARY
@@ -81,7 +81,7 @@ def _at_places(
 ) -> list[tuple[str, dict[str, float], dict[str, np.ndarray]]]:
     """(effect, a place of its grid, columns (series, N) of its switches there), by full names. `slots`: of the parameters of `problem` among all."""
     found: list[tuple[str, dict[str, float], dict[str, np.ndarray]]] = []
-    points, towards = [], []
+    points, names = [], []
     for effect in effects:
         for grid in LIBRARY[effect].candidate.grid(setting.extent):
             place = {f"{effect}.{name}": one for name, one in grid.items()}
@@ -91,11 +91,8 @@ def _at_places(
             found.append((effect, place, {}))
             for name in switches(effect):
                 points.append(here[slots])
-                towards.append(np.eye(len(slots))[[problem.names.index(name)]])
-    if not points:
-        return []
-    _, slopes = predicted_and_derivatives(problem, np.stack(points), np.stack(towards))
-    columns = iter(-problem.centred(slopes[:, 0]) / np.asarray(problem.noise))
+                names.append(name)
+    columns = iter(-slopes_at(problem, points, names) / np.asarray(problem.noise))
     for effect, _, own in found:
         own.update({name: next(columns) for name in switches(effect)})
     return found

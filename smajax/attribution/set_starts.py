@@ -36,7 +36,7 @@ def starts(joint: JointParameters, subset: Subset, linear: LinearModel, traces: 
         moved[slots[name]] = np.clip(values[slots[name]] + np.clip(step, -most, most), low, high)
     points = [values, moved]
     for variant in new:
-        points += [*_all_over(joint, variant.effect, moved), *_further(joint, variant.effect, moved)]
+        points += _elsewhere(joint, variant.effect, moved)
     return [_off_bounds(joint, one) for one in points]
 
 
@@ -73,26 +73,14 @@ def _begin(
     return values
 
 
-def _all_over(joint: JointParameters, effect: str, values: np.ndarray) -> list[np.ndarray]:
-    """`values` with the coefficients of an effect at Sobol points of the ranges in which fits of it begin, by logarithm."""
+def _elsewhere(joint: JointParameters, effect: str, values: np.ndarray) -> list[np.ndarray]:
+    """`values` with coefficients of an effect at Sobol points of the ranges in which fits of it begin, by logarithm, and at its further starts."""
     sizes = {name.split(".", 1)[1]: abs(float(values[joint.slots[name]])) for name in joint.switches(effect)}
-    ranges = LIBRARY[effect].candidate.start_ranges(sizes)
-    if not ranges:
-        return []
+    candidate = LIBRARY[effect].candidate
+    ranges = candidate.start_ranges(sizes)
+    places = [*(logarithmic_points(ranges, PLACES) if ranges else ()), *candidate.further_starts]
     points = []
-    for drawn in logarithmic_points(ranges, PLACES):
-        point = np.array(values)
-        for name, value in drawn.items():
-            full = f"{effect}.{name}"
-            point[joint.slots[full]] = np.clip(value, *joint.bounds[full])
-        points.append(point)
-    return points
-
-
-def _further(joint: JointParameters, effect: str, values: np.ndarray) -> list[np.ndarray]:
-    """`values` with the switches of an effect at each of the other places that it names."""
-    points = []
-    for place in LIBRARY[effect].candidate.further_starts:
+    for place in places:
         point = np.array(values)
         for name, value in place.items():
             full = f"{effect}.{name}"

@@ -16,7 +16,7 @@ from smajax.attribution.exclusive_effects import of_groups
 from smajax.attribution.joint_parameters import NUDGE, JointParameters, residual_and_columns
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.fit.integration import with_integration
-from smajax.fit.outputs_of_runs import made_ready, predicted_and_derivatives
+from smajax.fit.outputs_of_runs import made_ready, slopes_at
 from smajax.fit.problem import Problem
 from smajax.model.effects.candidate import Extent
 from smajax.model.effects.library import LIBRARY
@@ -113,22 +113,18 @@ def _elsewhere(
     places: Mapping[Variant, Mapping[str, float]],
 ) -> dict[Variant, Mapping[str, np.ndarray]]:
     """Columns of the switches of effects that are off, at their places. `index`: of the parameters of `problem` among all."""
-    points, tangents, owners = [], [], []
+    points, owners = [], []
     for variant, place in places.items():
         point = np.array(values)
         point[[joint.slots[name] for name in place]] = list(place.values())
         point = _nudged(joint, point, [variant.effect])
         for name in joint.switches(variant.effect):
             points.append(point[index])
-            tangents.append(np.eye(len(index))[[problem.names.index(name)]])
             owners.append((variant, name))
-    if not points:
-        return {}
     keep = np.asarray(problem.batch.mask) > 0
-    _, derivatives = predicted_and_derivatives(problem, np.stack(points), np.stack(tangents))
     found: dict[Variant, dict[str, np.ndarray]] = {}
-    for (variant, name), derivative in zip(owners, derivatives, strict=True):
-        found.setdefault(variant, {})[name] = problem.centred(derivative[0])[keep]
+    for (variant, name), slope in zip(owners, slopes_at(problem, points, [name for _, name in owners]), strict=True):
+        found.setdefault(variant, {})[name] = slope[keep]
     return dict(found)
 
 

@@ -137,8 +137,10 @@ def total_costs(problem: Problem, points: Sequence[np.ndarray] | np.ndarray) -> 
 
 def made_ready(problems: Sequence[Problem]) -> None:
     """Compile what `predicted_and_derivatives` of these problems runs: each beside the tracing of the next."""
+    if len(problems) < 2:
+        return  # its first call compiles it
     begun = []
-    for problem in problems if len(problems) > 1 else ():
+    for problem in problems:
         nothing = np.zeros((1, len(problem.names)))
         for number, run in enumerate(_runs(problem)):
             at = _of_run(problem, nothing, number)
@@ -168,6 +170,15 @@ def predicted_and_derivatives(
     values = [value[::directions] for value, _ in results]
     derivatives = [derivative.reshape(count, directions, *derivative.shape[1:]) for _, derivative in results]
     return np.concatenate(values, axis=1), np.concatenate(derivatives, axis=2)
+
+
+def slopes_at(problem: Problem, points: Sequence[np.ndarray], names: Sequence[str]) -> np.ndarray:
+    """Derivative of the sensor outputs at each of the points (P,) by one parameter each, centred, SI: (M, series, N)."""
+    if not points:
+        return np.zeros((0, *problem.measured.shape))
+    tangents = np.eye(len(problem.names))[[[problem.names.index(name)] for name in names]]
+    _, derivatives = predicted_and_derivatives(problem, np.stack(points), tangents)
+    return problem.centred(derivatives[:, 0])
 
 
 def _side_by_side(calls: Sequence[Callable[[], Result]]) -> list[Result]:

@@ -116,7 +116,7 @@ class Candidate:
     # Whether the load may stick and jump with it: then what a fit gains by it may be the integration's
     # (`attribution.step_size_check`).
     stick_slip: bool = False
-    # What it describes, where several effects describe the same in ways that exclude each other: no model has two of one group.
+    # What it describes, where several effects describe the same in ways that exclude each other: no model of the search has two of one group.
     exclusive_group: str = ""
     # Whether its priors take part in the fit whose values are reported as well: they say how smooth a shape is, which the runs alone
     # do not determine.

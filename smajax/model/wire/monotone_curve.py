@@ -27,8 +27,8 @@ _SHARES = _COSINE[_HELD[0] : _HELD[1]] / (KNOTS[_HELD[1]] - KNOTS[_HELD[0]])  # 
 def moved_place(z: Scalar, before: Sequence[Scalar], after: Sequence[Scalar]) -> Scalar:
     """Where the law's shape has what this curve has at the reduced distance `z`, -; exactly `z` with zeros.
 
-    z: shape (), as all coefficients; `jax.vmap` takes it over arrays. before, after: of the three parts on either side of the middle one, from it outwards: ln of the width over that of the
-    part next to it towards the middle, over the same in the cosine, -.
+    z: shape (), as all coefficients; `jax.vmap` takes it over arrays. before, after: of the three parts on either side of the middle
+    one, from it outwards: ln of the width over that of the part next to it towards the middle, over the same in the cosine, -.
     """
     # The map less z is interpolated, so that it is zero to the bit where nothing is stretched. It is a sum over the parts, each
     # of which stands still outside its own: rounding at a knot then makes no jump, as a choice of one part would. Arrays of all parts
