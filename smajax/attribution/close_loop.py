@@ -40,6 +40,7 @@ from smajax.attribution.saved_model import fit_run_states, saved_model
 from smajax.attribution.step_size_check import finer_integration, integration_error_of
 from smajax.attribution.unknown.search import Lacking, in_place_of, unknown_terms
 from smajax.attribution.verdict import verdict_of
+from smajax.core.blas_threads import on_one_blas_thread
 from smajax.core.progress import Progress, Result, Stage, as_progress, quiet, report_warnings
 from smajax.core.provenance import made_with
 from smajax.core.result_cache import ResultCache
@@ -90,6 +91,7 @@ class Outcome:
         return any(run.residual_is_noise for run in self.outliers)
 
 
+@on_one_blas_thread
 def close_loop(  # keywords, which a caller names one by one
     experiment: Experiment,
     *,
@@ -138,8 +140,7 @@ def close_loop(  # keywords, which a caller names one by one
         interim(known_so_far(context, (outcome.search, outcome.base, outcome.final), Remaining.CHECKS))
     outcome, rejected = against_the_held_out_runs(context, outcome)
     outcome = against_an_outlier_run(context, against_an_unknown_term(context, outcome))
-    compared = compare(context.job, context.setting, outcome.base, outcome.final)
-    found = findings_of(context, outcome, compared, rejected)
+    found = findings_of(context, outcome, compare(context.job, context.setting, outcome.base, outcome.final), rejected)
     provenance = _provenance(experiment, cache, command, seed, clock.monotonic() - began)
     return replace(found, record_errors=tuple(errors), provenance=provenance)
 
@@ -300,8 +301,8 @@ def unknown_terms_of(context: Context, outcome: Outcome, verdict: Verdict) -> tu
 def known_so_far(context: Context, models: tuple[JointSearch, Model, Model], remaining: Remaining) -> Findings:
     """What an attribution that goes on knows by then, as findings without a verdict. `models`: the search, base model, likeliest model."""
     search, base, final = models
-    compared = compare(context.job, context.setting, base, final)
-    found = findings_of(context, Outcome(search, base, final, Lacking()), compared, brief=True)
+    outcome = Outcome(search, base, final, Lacking())
+    found = findings_of(context, outcome, compare(context.job, context.setting, base, final), brief=True)
     base_model, extended_model = (
         None if one is None else replace(one, unfinished=remaining.value)
         for one in (found.base_model, found.extended_model)
@@ -318,7 +319,7 @@ def known_so_far(context: Context, models: tuple[JointSearch, Model, Model], rem
 def findings_of(
     context: Context, outcome: Outcome, compared: Compared, rejected: tuple[Rejected, ...] = (), brief: bool = False
 ) -> Findings:
-    """The record of all stages. `brief`: without what takes long, the scores of effects that were not added and the averages."""
+    """The record of all stages. `brief`: without what takes long, the scores of effects that were not added, the confounders and the averages."""
     job, setting, experiment = context.job, context.setting, context.job.experiment
     base, final = outcome.base, outcome.final
     runs, residual_before, residual_after = compared
@@ -337,8 +338,7 @@ def findings_of(
     if final.effects:
         states = fit_run_states(job, setting, base)
         base_model = saved_model(job, setting, outcome.search, base, before, None, states)
-    mistaken = confounders(outcome.search, setting, final, job.fit_runs)
-    integration = integration_error_of(setting, final)
+    mistaken = () if brief else confounders(outcome.search, setting, final, job.fit_runs)
     setting.progress(Stage(WRITING, 1.0))
     verdict = verdict_of(final.effects, residual_after, setting.config)
     lacking, superseded = unknown_terms_of(context, outcome, verdict)
@@ -362,7 +362,7 @@ def findings_of(
         rounds=tuple(setting.rounds),
         explained_variance=setting.explained_variance(final.left_out_rmse),
         step=experiment.step,
-        integration=integration,
+        integration=integration_error_of(setting, final),
         offset=experiment.offset,
         wire=experiment.wire,
         load=experiment.load,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -45,6 +46,7 @@ class Start:
     effects: tuple[str, ...]
     values: np.ndarray  # (P,), in the order of the whole library's problem
     weights: np.ndarray | None = None  # of the runs, (R,); None: all alike
+    goal: float = math.inf  # as of `FitTask`
 
 
 @dataclass(frozen=True)
@@ -197,7 +199,9 @@ class Search:
         every = [name for start in starts for name in start.effects]
         problem, index = self.restricted(every, self.prior_records(presets, level, every, width_factors))
         tasks = [
-            problem.task([*self.free(start.effects), *freed], self.bounds, start.values[index], start.weights)
+            problem.task([*self.free(start.effects), *freed], self.bounds, start.values[index], start.weights)._replace(
+                goal=start.goal
+            )
             for start in starts
         ]
         settings = FitSettings(

@@ -9,11 +9,13 @@ the search has ended, so an effect of the library that accounts for all runs goe
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from smajax.attribution.model_fits import Model, Search, Start
 from smajax.attribution.record_error import OutlierRun
+from smajax.fit.levenberg_marquardt import Fit
 from smajax.fit.outputs_of_runs import misfits
 
 SETTLED = 0.02  # of what one sample adds to the cost
@@ -45,7 +47,8 @@ def outlier_runs(setting: Search, model: Model, names: Sequence[str]) -> tuple[O
     fits, found = setting.fit(starts, stage, enough=FIRST, settled=settled, presets=True, width_factors=factors)
     near = [k for k, start in enumerate(starts) if _near(setting, found[k], start, whole)]
     if near:
-        again, misfit = setting.fit([starts[k] for k in near], stage, hops=True, presets=True, width_factors=factors)
+        aimed = [_aimed(setting, starts[k], fits[k], whole) for k in near]
+        again, misfit = setting.fit(aimed, stage, settled=settled, hops=True, presets=True, width_factors=factors)
         for k, fit, one in zip(near, again, misfit, strict=True):
             fits[k], found[k] = fit, one
     outliers = []
@@ -69,6 +72,18 @@ def outlier_runs(setting: Search, model: Model, names: Sequence[str]) -> tuple[O
         and outliers[0].others_without * config.influential_ratio < outliers[0].others_with
     )
     return noise or (outliers[0],) * influential
+
+
+def _aimed(setting: Search, start: Start, ended: Fit, whole: np.ndarray) -> Start:
+    """Once more from where a fit has ended; one that comes neither to noise nor to an influential run's fall of the error says nothing."""
+    config, noise = setting.config, float(setting.problem.noise_sigma)
+    assert start.weights is not None
+    others = start.weights[setting.problem.owner] > 0.0
+    mask = np.asarray(setting.problem.batch.mask)[others]
+    told = [config.white_noise_ratio * noise]
+    if len(start.weights) >= config.influential_least_runs:
+        told.append(_rms(whole[others], mask) / config.influential_ratio)
+    return replace(start, values=ended.values, goal=float(mask.sum()) * (max(told) / noise) ** 2)
 
 
 def _near(setting: Search, left: np.ndarray, start: Start, whole: np.ndarray) -> bool:

@@ -348,7 +348,7 @@ def laid_out(items: Sequence[Item], names: Names, lanes: int, vectors: int, star
 
 def _written(phase: _Phase, number: int, before: str, names: Names, lanes: int, places: Mapping[str, int]) -> list[str]:
     """A phase as a loop over the vectors of a group, or over those chosen."""
-    stem, chosen = f"%phase{number}", phase.chosen
+    stem, chosen, rows = f"%phase{number}", phase.chosen, dict[int, str]()  # `rows`: this vector's places, by its bytes
     count, turn, at, many = f"{stem}.k", f"{stem}.turn", f"{stem}.at", f"{stem}.many" if chosen else "%vectors"
     here = {name: f"{name}.{number}" for name in phase.loads} | {"%at": at, "%turn": turn}
     lines = [f"  {many} = load i64, ptr {chosen.count}"] if chosen else []
@@ -368,10 +368,11 @@ def _written(phase: _Phase, number: int, before: str, names: Names, lanes: int, 
         return OWN.sub(lambda one: here.get(one[0], one[0]), text)
 
     def address(name: str, use: str) -> str:
-        base, where = f"{stem}.{use}.base", f"{stem}.{use}.address"
-        lines.append(f"  {base} = getelementptr inbounds i8, ptr %scratch, i64 {places[name]}")
-        lines.append(f"  {where} = getelementptr inbounds [{names.layouts[name].size} x i8], ptr {base}, i64 {turn}")
-        size = names.layouts[name].size
+        size, where = names.layouts[name].size, f"{stem}.{use}.address"
+        if size not in rows:
+            rows[size] = f"{stem}.row{size}"
+            lines.append(f"  {rows[size]} = getelementptr inbounds [{size} x i8], ptr %scratch, i64 {turn}")
+        lines.append(f"  {where} = getelementptr inbounds i8, ptr {rows[size]}, i64 {places[name]}")
         return f"ptr {where}, align {min(size & -size, LINE)}"
 
     for k, name in enumerate(phase.loads):

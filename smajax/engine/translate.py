@@ -36,7 +36,7 @@ from smajax.engine.text import NAME, Array, Lane, Text, Unsupported, scalar_type
 from smajax.engine.values import SMALL, Filled, Held, Stored, Value, held, is_known, name_of, size_of
 
 OF_TWO_KINDS = ("select_n", "convert_element_type", "bitcast_convert_type")
-VECTORS = 8  # of a group: while one waits for a result others go on
+VECTORS = 6  # of a group: while one waits for a result others go on
 CALLS = {
     name for name, own in TABLE.items() if "program" in own and name != "scan"
 }  # they stand for a program of their own

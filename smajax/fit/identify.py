@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import scipy  # its parts are imported when they are first used
 
+from smajax.core.blas_threads import on_one_blas_thread
 from smajax.core.progress import Progress, as_progress, quiet
 from smajax.core.provenance import made_with
 from smajax.core.result_cache import ResultCache
@@ -38,6 +39,7 @@ SEED = 2004
 LEAST_FOR_SHAPE = 8  # samples, for D'Agostino's test
 
 
+@on_one_blas_thread
 def identify(  # ten parameters: the options of the command, by keyword
     experiment: Experiment,
     *,

@@ -50,6 +50,7 @@ from smajax.fit.problem import FitTask, Problem
 MAX_STEPS = 120
 TOLERANCE = 1e-8  # of the cost: what the last step may still lower it by, and predict; scipy's too
 MAX_DAMPING = 1e10  # at which no step lowers the cost
+GOAL_STEPS = 4  # after which a fit has to promise to come to its goal
 TWICE = 2.0  # the model's decrease: of a fit that is far from its optimum it says too little
 PADDING = 8  # free parameters are padded to a multiple of this: one compiled program serves fits of several sizes
 DESCENT, SEARCH = BoundedDampedNewtonDescent(), GainRatioSearch()
@@ -85,7 +86,7 @@ class FitSettings:
     predicted no more. Of `allowed_excess`, (steps, cost) each: after so many steps a fit ends whose cost is above the least
     of all by more than that; `least_cost` is that of fits that have ended elsewhere. `promised_excess`, (steps, cost): the same of
     what a fit is still to come to, by twice the decrease that its derivatives promise. `one_of_each`: after so many steps one fit alone goes on, the best, of those that
-    free the same parameters; 0: all do.
+    free the same parameters; 0: all do. A fit whose task has a `goal` ends after `GOAL_STEPS` where it promises to stay above that, likewise.
     """
 
     max_steps: int = MAX_STEPS
@@ -281,7 +282,7 @@ def levenberg_marquardt(
         if not going:
             break
         advance(going)
-        states = _without_exceeding(states, number + 1, settings)
+        states = _without_exceeding(tasks, states, number + 1, settings)
         if number + 1 == settings.one_of_each:
             states = _best_of_each(tasks, states)
     cache.save(key, _packed(states, settings.max_steps))
@@ -306,18 +307,23 @@ def _best(
     return BestFit(stage, found, units, tuple(errors[k].tolist()) if k in errors else ())
 
 
-def _without_exceeding(states: Sequence[LMState], steps: int, settings: FitSettings) -> list[LMState]:
-    """Fits end that after these steps are too far above the least cost, or promise to stay so."""
+def _without_exceeding(
+    tasks: Sequence[FitTask], states: Sequence[LMState], steps: int, settings: FitSettings
+) -> list[LMState]:
+    """Fits end that after these steps are too far above the least cost or their goal, or promise to stay so."""
     excess = min((0.5 * most for after, most in settings.allowed_excess if steps >= after), default=np.inf)
     least = min(min((float(state.f) for state in states), default=np.inf), 0.5 * settings.least_cost)
     after, most = settings.promised_excess or (0, np.inf)
-    ahead = 0.5 * most if steps >= after else np.inf
+    ahead = least + 0.5 * most if steps >= after else np.inf
 
-    def exceeds(state: LMState) -> bool:
-        above = float(state.f) - least
-        return above > excess or (above > ahead and above - TWICE * float(_promised(state.descent)) > ahead)
+    def exceeds(task: FitTask, state: LMState) -> bool:
+        f, allowed = float(state.f), min(ahead, 0.5 * task.goal if steps >= GOAL_STEPS else np.inf)
+        return f > least + excess or (f > allowed and f - TWICE * float(_promised(state.descent)) > allowed)
 
-    return [_ended_as_exceeded(one) if one.status == Status.RUNNING and exceeds(one) else one for one in states]
+    return [
+        _ended_as_exceeded(state) if state.status == Status.RUNNING and exceeds(task, state) else state
+        for task, state in zip(tasks, states, strict=True)
+    ]
 
 
 def _best_of_each(tasks: Sequence[FitTask], states: Sequence[LMState]) -> list[LMState]:

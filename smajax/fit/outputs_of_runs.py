@@ -161,11 +161,11 @@ def predicted_and_derivatives(
     if directions == 0:
         return predicted_at(problem, points), np.zeros((count, 0, *problem.batch.output.shape))
     pairs = np.repeat(points, directions, axis=0), tangents.reshape(count * directions, -1)
-    calls: list[Callable[[], tuple[np.ndarray, np.ndarray]]] = []
+    calls: list[Callable[[int], tuple[np.ndarray, np.ndarray]]] = []
     for number, run in enumerate(_runs(problem)):
         at, along = (_of_run(problem, part, number) for part in pairs)
         scalars = {**_columns("value", at), **_columns("tangent", along)}
-        calls.append(partial(program(_along, run, tuple(scalars)), run, scalars))
+        calls.append(partial(program(_along, run, tuple(scalars)), run, scalars))  # and the number of threads
     results = _side_by_side(calls)
     values = [value[::directions] for value, _ in results]
     derivatives = [derivative.reshape(count, directions, *derivative.shape[1:]) for _, derivative in results]
@@ -181,13 +181,18 @@ def slopes_at(problem: Problem, points: Sequence[np.ndarray], names: Sequence[st
     return problem.centred(derivatives[:, 0])
 
 
-def _side_by_side(calls: Sequence[Callable[[], Result]]) -> list[Result]:
-    """What the calls give: of few points one run leaves cores idle, which another takes."""
-    workers = min(len(calls), available_cores())
-    if workers < 2:
-        return [call() for call in calls]
+def _side_by_side(calls: Sequence[Callable[[int], Result]]) -> list[Result]:
+    """What the calls give, each told how many threads it may take.
+
+    As many as there are cores go side by side, on one thread each: cut into parts of few vectors a run takes longer. What is left after that is cut.
+    """
+    cores = available_cores()
+    left = len(calls) % cores
+    threads = [1] * (len(calls) - left) + [cores // max(left, 1)] * left
+    if min(len(calls), cores) < 2:
+        return [call(share) for call, share in zip(calls, threads, strict=True)]
     try:
-        with ThreadPoolExecutor(workers) as pool:
-            return list(pool.map(lambda call: call(), calls))
+        with ThreadPoolExecutor(min(len(calls), cores)) as pool:
+            return list(pool.map(lambda call, share: call(share), calls, threads))
     except RuntimeError:  # no room for another thread under a cap on memory
-        return [call() for call in calls]
+        return [call(1) for call in calls]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, NamedTuple, TypeVar
@@ -33,6 +34,7 @@ class FitTask(NamedTuple):
     values: np.ndarray  # every parameter of the problem, (P,)
     weights: np.ndarray  # (R,): 0 leaves a run out
     regularisation: np.ndarray  # (F,): pull back to the initial guess, in the residual's unit per range
+    goal: float = math.inf  # cost that it has to promise to come to (`FitSettings`)
 
     @property
     def initial_guess(self) -> np.ndarray:

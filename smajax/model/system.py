@@ -42,6 +42,11 @@ class System(eqx.Module):
         return grouped(self.effects)
 
 
+def prepared(system: System) -> System:
+    """`system` with what its effects compute once a run."""
+    return dataclasses.replace(system, effects=tuple(one.prepared() for one in system.effects))
+
+
 def recorded_apart(system: System) -> frozenset[str]:
     """Channels that another recorder may have written than the sensor's, and that may so be late: the drive's; a coupon's temperature.
 

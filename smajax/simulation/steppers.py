@@ -16,7 +16,7 @@ from jax import lax
 from smajax.core.where_tree import where_tree
 from smajax.model.drive.inputs import switched
 from smajax.model.load.base import AbstractMovingLoad
-from smajax.model.system import System
+from smajax.model.system import System, prepared
 from smajax.model.types import Inputs, Scalar, State
 from smajax.simulation.adaptive_steps import advance
 from smajax.simulation.integrate import Carry, Schedule, integrate
@@ -191,7 +191,8 @@ Stepper = FixedStep | EqualSteps | ErrorControlledSteps | CouponSubsteps | Switc
 
 
 def stepper_of(system: System, dt: Scalar | float, integration: Integration = ONE_STEP, once: bool = False) -> Stepper:
-    """The stepper that `integration` asks for of this load."""
+    """The stepper that `integration` asks for of this load. What is the same in every step is computed here."""
+    system = prepared(system)
     if isinstance(system.load, AbstractMovingLoad):
         whole: FixedStep | EqualSteps | ErrorControlledSteps = FixedStep(system, dt, once)
         if integration.substeps > 1:

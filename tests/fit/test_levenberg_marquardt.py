@@ -20,6 +20,7 @@ from smajax.fit.bounded_descent import (
 )
 from smajax.fit.directions import directions
 from smajax.fit.levenberg_marquardt import (
+    GOAL_STEPS,
     MAX_DAMPING,
     MAX_STEPS,
     TOLERANCE,
@@ -119,8 +120,11 @@ def test_within_optimistixs_own_loop_the_end_is_scipys() -> None:
         np.testing.assert_allclose(solution.value, exact.x, atol=1e-5)
 
 
+ONE = _task(np.full(1, 0.5))
+
+
 def test_a_fit_ends_where_its_cost_falls_by_less_than_the_absolute_tolerance() -> None:
-    state = _initial_state(_task(np.full(1, 0.5)), 8)
+    state = _initial_state(ONE, 8)
     falling = [(1.0, np.ones(1)), (0.9, np.ones(1)), (0.8999, np.full(1, 1e-3))]
     ended = []
     for cost, gradient in falling:
@@ -130,22 +134,19 @@ def test_a_fit_ends_where_its_cost_falls_by_less_than_the_absolute_tolerance() -
 
 
 def test_fits_far_above_the_best_end_after_as_many_steps_as_allowed() -> None:
-    near, far = (
-        _advanced(_initial_state(_task(np.full(1, 0.5)), 8), (cost, np.ones(1), np.eye(1)), TOLERANCES)
-        for cost in (10.0, 200.0)
-    )
+    near, far = (_advanced(_initial_state(ONE, 8), (cost, np.ones(1), np.eye(1)), TOLERANCES) for cost in (10.0, 200.0))
     allowed = FitSettings(allowed_excess=((3, 400.0), (6, 100.0)))
     for steps, expected in ((2, Status.RUNNING), (3, Status.RUNNING), (6, Status.EXCEEDED)):
-        states = _without_exceeding([near, far], steps, allowed)
+        states = _without_exceeding([ONE, ONE], [near, far], steps, allowed)
         assert [int(state.status) for state in states] == [Status.RUNNING, expected]
     elsewhere = dataclasses.replace(allowed, least_cost=9.0)  # of fits in another program
-    states = _without_exceeding([far], 6, elsewhere)
+    states = _without_exceeding([ONE], [far], 6, elsewhere)
     assert [int(state.status) for state in states] == [Status.EXCEEDED]
 
 
 def test_a_fit_ends_that_promises_to_stay_far_above_the_best() -> None:
     """By the least value of its quadratic model: cost 200 with a column that takes off 10, or 190, of it."""
-    best = _advanced(_initial_state(_task(np.full(1, 0.5)), 8), (10.0, np.zeros(1), np.eye(1)), TOLERANCES)
+    best = _advanced(_initial_state(ONE, 8), (10.0, np.zeros(1), np.eye(1)), TOLERANCES)
     settings = FitSettings(promised_excess=(4, 50.0))
     for decrease, steps, expected in (
         (10.0, 4, Status.EXCEEDED),
@@ -154,11 +155,25 @@ def test_a_fit_ends_that_promises_to_stay_far_above_the_best() -> None:
     ):
         # The minimum of f = r^T r / 2 lies 0.1 away, within the bounds, and is lower by decrease / 2.
         gradient, hessian = np.array([decrease / 0.1]), np.array([[decrease / 0.1**2]])
-        far = _advanced(_initial_state(_task(np.full(1, 0.5)), 8), (200.0, gradient, hessian), TOLERANCES)
-        assert [int(one.status) for one in _without_exceeding([best, far], steps, settings)] == [
+        far = _advanced(_initial_state(ONE, 8), (200.0, gradient, hessian), TOLERANCES)
+        assert [int(one.status) for one in _without_exceeding([ONE, ONE], [best, far], steps, settings)] == [
             Status.RUNNING,
             expected,
         ]
+
+
+def test_a_fit_ends_that_promises_to_stay_above_its_goal() -> None:
+    """Cost 200 that falls by 60 to the least value of its quadratic model: to a goal of 85 it may come by twice that, to 70 not."""
+    gradient, hessian = np.array([600.0]), np.array([[6000.0]])
+    state = _advanced(_initial_state(ONE, 8), (200.0, gradient, hessian), TOLERANCES)
+    for goal, steps, expected in (
+        (85.0, GOAL_STEPS, Status.RUNNING),
+        (70.0, GOAL_STEPS, Status.EXCEEDED),
+        (70.0, GOAL_STEPS - 1, Status.RUNNING),
+        (250.0, GOAL_STEPS, Status.RUNNING),  # it is there
+    ):
+        (one,) = _without_exceeding([ONE._replace(goal=goal)], [state], steps, FitSettings())
+        assert one.status == expected
 
 
 def test_of_fits_that_free_the_same_the_best_alone_goes_on() -> None:

@@ -149,3 +149,42 @@ def test_the_shape_of_a_branch_in_numbers() -> None:
         shape = branch_shape(dict(zip(names, values, strict=True)), "heating")
         assert np.all(np.isfinite(shape[:3]))
         assert min(shape[:3]) > 0.0
+
+
+@settings(deadline=None, max_examples=25)
+@given(s=SIX, z=st.floats(-1.0, 2.0), cooling=st.booleans())
+def test_prepared_the_effect_has_the_same_places_and_derivatives_on_either_branch(
+    s: list[float], z: float, cooling: bool
+) -> None:
+    """`prepared` computes once a run what is of the coefficients alone, and `place_on` looks one of the two curves up."""
+
+    def places(s: jax.Array, z: jax.Array, once: bool) -> jax.Array:
+        names = TransformationCurve.candidate.switches
+        effect = TransformationCurve(**dict(zip(names, [*s, *(-0.5 * s)], strict=True)))
+        effect = effect.prepared() if once else effect
+        both = jnp.where(cooling, 1.0 - effect.cooling_place(1.0 - z), effect.heating_place(z))
+        return jnp.stack([both, effect.place_on(jnp.asarray(cooling), z)])
+
+    given = jnp.asarray(s), jnp.asarray(z)
+    apart, once = (jax.jit(places, static_argnums=2)(*given, one) for one in (False, True))
+    np.testing.assert_allclose(once, np.full(2, apart[0]), rtol=1e-12, atol=1e-12)
+    for argument in (0, 1):
+        slopes = [jax.jit(jax.jacobian(places, argument), static_argnums=2)(*given, one) for one in (False, True)]
+        np.testing.assert_allclose(slopes[1], slopes[0], rtol=1e-9, atol=1e-12)
+
+
+def test_derivatives_of_the_map_agree_with_differences() -> None:
+    """By its coefficients and by z, and the mixed second ones, away from the knots."""
+    place = lambda s, z: moved_place(z, tuple(s[:3]), tuple(s[3:]))  # noqa: E731
+    slope, mixed = jax.jit(jax.grad(place, (0, 1))), jax.jit(jax.jacobian(jax.grad(place, 1), 0))
+    drawn = np.random.default_rng(7)
+    for s, z in zip(0.7 * drawn.standard_normal((20, 6)), drawn.uniform(-0.5, 1.5, 20), strict=True):
+        if np.abs(_knots(list(s)) - z).min() < 1e-4:
+            continue
+        by_s, by_z = slope(jnp.asarray(s), z)
+        step = 1e-6 * np.eye(6)
+        differences = [(place(s + one, z) - place(s - one, z)) / 2e-6 for one in step]
+        np.testing.assert_allclose(by_s, differences, rtol=1e-6, atol=1e-8)
+        np.testing.assert_allclose(by_z, (place(s, z + 1e-6) - place(s, z - 1e-6)) / 2e-6, rtol=1e-6, atol=1e-8)
+        second = [(slope(s + one, z)[1] - slope(s - one, z)[1]) / 2e-6 for one in step]
+        np.testing.assert_allclose(mixed(jnp.asarray(s), z), second, rtol=1e-5, atol=1e-7)

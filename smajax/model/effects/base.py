@@ -9,7 +9,7 @@ model contains the base model. What it may change is said beside each equation, 
 | heat balance | `wire.heat.HeatTerm` | `stored_heat(wire, temperature, fraction)`, `heat_loss(wire, at)`, `ambient_shift(time)` |
 | resistance | `wire.resistance.ResistanceTerm` | `resistance_factor(temperature, fraction)` |
 | kinetics: shape | `wire.kinetics_terms.ShapeTerm` | `heating_shape(z, remaining)`, `cooling_shape(z, remaining)` |
-| kinetics: place on the shape | `wire.kinetics_terms.PlaceTerm` | `heating_place(z)`, `cooling_place(z)` |
+| kinetics: place on the shape | `wire.kinetics_terms.PlaceTerm` | `heating_place(z)`, `cooling_place(z)`, `place_on(cooling, z)` |
 | kinetics: range | `wire.kinetics_terms.RangeTerm` | `heating_distance(law, z, temperature, stress, old)`, `cooling_distance(law, z, temperature, stress, old)` |
 | kinetics: a second part of the wire | `wire.kinetics_terms.PopulationTerm` | `second_conditions()` |
 | constitutive law | `wire.constitutive.ConstitutiveTerm` | `strain(wire, at)`, `modulus_change(wire, fraction)` |
@@ -48,6 +48,10 @@ class AbstractEffect(eqx.Module):
     def base(cls) -> Self:
         """The effect at its base value: present in the equations and changing nothing."""
         return cls()
+
+    def prepared(self) -> Self:
+        """The effect with what is of its coefficients alone computed: asked for once a run, before its first step."""
+        return self
 
 
 # Names of version 0.1 -> where they are now; until version 0.3.

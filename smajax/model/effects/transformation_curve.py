@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from functools import partial
 from typing import ClassVar, NamedTuple
@@ -9,13 +10,14 @@ from typing import ClassVar, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Bool
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
 from smajax.model.effects.candidate import TRANSFORMATION_SHAPE, Actuator, Candidate, Width
 from smajax.model.types import Scalar
 from smajax.model.wire.kinetics_terms import PlaceTerm
-from smajax.model.wire.monotone_curve import moved_place
+from smajax.model.wire.monotone_curve import MonotoneCurve, monotone_curve
 from smajax.model.wire.shape import Cosine
 
 _PARTS = ("inner", "middle", "outer")  # from the middle of the transformation outwards
@@ -69,6 +71,8 @@ class TransformationCurve(AbstractEffect, PlaceTerm):
     cooling_finish_middle: Scalar = _part("cooling, last third, middle part")
     cooling_finish_outer: Scalar = _part("cooling, last third, outer part")
 
+    curves: dict[str, MonotoneCurve] | None = None  # of the branches, once they are computed (`prepared`)
+
     effect_name: ClassVar[str] = "transformation_curve"
     candidate: ClassVar[Candidate] = Candidate(
         title="curve of the transformation",
@@ -86,15 +90,28 @@ class TransformationCurve(AbstractEffect, PlaceTerm):
         widths=dict.fromkeys(_ALL, _WIDTH),
     )
 
+    def prepared(self) -> TransformationCurve:
+        """The same with the curves of both branches computed."""
+        return dataclasses.replace(self, curves={branch: self._curve(branch) for branch in _FIELDS})
+
     def heating_place(self, z: Scalar) -> Scalar:
         return self._moved(z, "heating")
 
     def cooling_place(self, z: Scalar) -> Scalar:
         return 1.0 - self._moved(1.0 - z, "cooling")  # z falls from 1 to 0 on cooling
 
+    def place_on(self, cooling: Bool[Array, ""], z: Scalar) -> Scalar:
+        heated, cooled = (self._curve(branch) for branch in ("heating", "cooling"))
+        return jax.tree.map(partial(jnp.where, cooling), cooled, heated)(z)  # one of the two curves is looked up
+
     def _moved(self, distance: Scalar, branch: str) -> Scalar:
+        return self._curve(branch)(distance)
+
+    def _curve(self, branch: str) -> MonotoneCurve:
+        if self.curves is not None:
+            return self.curves[branch]
         s = [getattr(self, name) for name in _FIELDS[branch]]
-        return moved_place(distance, s[: len(_PARTS)], s[len(_PARTS) :])
+        return monotone_curve(s[: len(_PARTS)], s[len(_PARTS) :])
 
 
 def branch_shape(values: Mapping[str, float], branch: str) -> BranchShape:

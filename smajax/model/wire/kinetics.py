@@ -156,6 +156,8 @@ def curve_on(
     at = temperature, stress, state
     mirrored = 1.0 - cooling_distance(law, terms, *at)
     z = jnp.where(branch.cooling, mirrored, heating_distance(law, terms, *at))
+    for placed in terms.places:
+        z = placed.place_on(branch.cooling, z)
     share = _or_none(law.shape.martensite_left(z))
     return fraction_on(state, branch, *law.renewal.curves(state, *_shares(law, terms, state), share, share))
 
@@ -167,7 +169,10 @@ def open_branches(law: Kinetics, terms: KineticsTerms, state: WireState) -> Bran
         return Branch(h > 0.0, k > 0.0)
     at = state.temperature, state.stress, over(state, 0.0)
     left = law.shape.anything_left
-    return Branch(left(heating_distance(law, terms, *at)), left(1.0 - cooling_distance(law, terms, *at)))
+    heated, cooled = heating_distance(law, terms, *at), cooling_distance(law, terms, *at)
+    for placed in terms.places:
+        heated, cooled = placed.heating_place(heated), placed.cooling_place(cooled)
+    return Branch(left(heated), left(1.0 - cooled))
 
 
 def _tightening(

@@ -8,11 +8,15 @@ last ones a straight line.
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 from collections.abc import Sequence
 
+import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
 from smajax.model.types import Scalar
 
@@ -24,23 +28,96 @@ _COSINE = np.diff(KNOTS)
 _SHARES = _COSINE[_HELD[0] : _HELD[1]] / (KNOTS[_HELD[1]] - KNOTS[_HELD[0]])  # of the parts between those
 
 
-def moved_place(z: Scalar, before: Sequence[Scalar], after: Sequence[Scalar]) -> Scalar:
-    """Where the law's shape has what this curve has at the reduced distance `z`, -; exactly `z` with zeros.
+class MonotoneCurve(eqx.Module):
+    """The map with all that is of its coefficients alone: computed once a run, and not wherever a place is looked up."""
 
-    z: shape (), as all coefficients; `jax.vmap` takes it over arrays. before, after: of the three parts on either side of the middle
-    one, from it outwards: ln of the width over that of the part next to it towards the middle, over the same in the cosine, -.
+    knots: Float[Array, 8]
+    width: Float[Array, 7]  # of the parts
+    shift: Scalar  # by how much the first knot lies further right
+    before: Scalar  # slope of the map less 1 beyond the first knot, and beyond the last
+    beyond: Scalar
+    rising: Float[Array, 7]  # Hermite's cubic from the left knot on, by powers: the map less z
+    square: Float[Array, 7]
+    cube: Float[Array, 7]
+
+    def __call__(self, z: Scalar) -> Scalar:
+        """The place at the reduced distance `z`, -, both of shape (); `jax.vmap` takes it over arrays."""
+        moved: Scalar = _moved((self, z))
+        return moved
+
+
+def _within(curve: MonotoneCurve, z: Scalar) -> Scalar:
+    """How far z is within each part, (7,): from 0 to its width."""
+    # Not `clip`, whose derivative asks at every end whether it is met exactly.
+    within = z - curve.knots[:-1]
+    return jnp.where(within < 0.0, 0.0, jnp.where(within > curve.width, curve.width, within))
+
+
+def _value(curve: MonotoneCurve, within: Scalar, ahead: Scalar, behind: Scalar) -> Scalar:
+    """The map less z. A sum over the parts, each of which stands still outside its own: rounding at a knot then makes no jump, as a choice of one part would."""
+    inside = jnp.sum(within * (curve.rising + within * (curve.square + within * curve.cube)))
+    return inside + curve.before * ahead + curve.beyond * behind - curve.shift
+
+
+def _outside(curve: MonotoneCurve, z: Scalar) -> tuple[Scalar, Scalar]:
+    """How far z is before the first knot (negative) and beyond the last one."""
+    ahead, behind = z - curve.knots[0], z - curve.knots[-1]
+    return jnp.where(ahead < 0.0, ahead, 0.0), jnp.where(behind > 0.0, behind, 0.0)
+
+
+@eqx.filter_custom_jvp
+def _moved(given: tuple[MonotoneCurve, Scalar]) -> Scalar:
+    curve, z = given
+    return z + _value(curve, _within(curve, z), *_outside(curve, z))
+
+
+@_moved.def_jvp
+def _moved_jvp(primals, tangents):  # type: ignore[no-untyped-def]  # the signature is equinox's
+    r"""With the slope, and what the coefficients change at the same z, as sums over the parts like the map: both are continuous.
+
+    With $t$ within a part: $\phi' = 1 + s_0 + \sum t (2 b + 3 c t)$, and $d\phi = - (d\,shift + s_0\, dk_0) + \sum t (da - 2 b\,dk + t (db - 3 c\,dk + t\,dc))$,
+    $k$ the left knot of a part, $a, b, c$ its rising, square and cube, $s_0$ the slope less 1 before the first knot.
     """
-    # The map less z is interpolated, so that it is zero to the bit where nothing is stretched. It is a sum over the parts, each
-    # of which stands still outside its own: rounding at a knot then makes no jump, as a choice of one part would. Arrays of all parts
-    # are an eighth of the operations to trace.
-    outwards = [*reversed(list(itertools.accumulate(before))), jnp.zeros_like(z), *itertools.accumulate(after)]
+    ((curve, z),), ((turned, shifted),) = primals, tangents
+    within, outside = _within(curve, z), _outside(curve, z)
+    moved = jnp.zeros_like(z)
+    if shifted is not None:
+        inside = jnp.sum(within * (2.0 * curve.square + 3.0 * within * curve.cube))
+        moved = shifted * (1.0 + curve.before + inside)
+    if any(leaf is not None for leaf in jax.tree.leaves(turned)):
+        moved = moved + _value(_turned(curve, turned), within, *outside)
+    return _moved((curve, z)), moved
+
+
+def _turned(curve: MonotoneCurve, by: MonotoneCurve) -> MonotoneCurve:
+    """What a change of the coefficients `by` changes of the map, between the same knots."""
+    left = by.knots[:-1]
+    return dataclasses.replace(
+        curve,
+        shift=by.shift + curve.before * by.knots[0],
+        before=by.before,
+        beyond=by.beyond,
+        rising=by.rising - 2.0 * curve.square * left,
+        square=by.square - 3.0 * curve.cube * left,
+        cube=by.cube,
+    )
+
+
+def monotone_curve(before: Sequence[Scalar], after: Sequence[Scalar]) -> MonotoneCurve:
+    """The map with coefficients of shape (), exactly the identity with zeros.
+
+    before, after: of the three parts on either side of the middle one, from it outwards: ln of the width over that of the part
+    next to it towards the middle, over the same in the cosine, -.
+    """
+    # The map less z is interpolated, so that it is zero to the bit where nothing is stretched. Arrays of all parts are an eighth of the operations to trace.
+    outwards = [*reversed(list(itertools.accumulate(before))), jnp.zeros_like(before[0]), *itertools.accumulate(after)]
     wider = jnp.expm1(jnp.stack(outwards))
     between = _SHARES @ wider[_HELD[0] : _HELD[1]]
     scale = 1.0 / (1.0 + between)
     stretch, excess = (1.0 + wider) * scale, (wider - between) * scale  # `excess` is `stretch` less 1
     width = _COSINE * stretch
     parts = list(_COSINE * excess)
-    further = [jnp.zeros_like(z)]  # by how much each knot lies further right
+    further = [jnp.zeros_like(between)]  # by how much each knot lies further right
     for one in parts[_HELD[0] :]:
         further.append(further[-1] + one)
     for one in reversed(parts[: _HELD[0]]):
@@ -53,9 +130,10 @@ def moved_place(z: Scalar, before: Sequence[Scalar], after: Sequence[Scalar]) ->
     slope = jnp.concatenate([-excess[:1] / stretch[:1], inner, -excess[-1:] / stretch[-1:]])
     chord = -excess / stretch
     rising, falling = slope[:-1], slope[1:]
-    # Hermite's cubic from the left knot on, by powers: what is of the coefficients alone is computed once a run, and not in every step.
     square, cube = (3.0 * chord - 2.0 * rising - falling) / width, (rising + falling - 2.0 * chord) / (width * width)
-    within = jnp.clip(z - knots[:-1], 0.0, width)
-    inside = jnp.sum(within * (rising + within * (square + within * cube)))
-    beyond = slope[0] * jnp.minimum(z - knots[0], 0.0) + slope[-1] * jnp.maximum(z - knots[-1], 0.0)
-    return z - further[0] + inside + beyond
+    return MonotoneCurve(knots, width, further[0], slope[0], slope[-1], rising, square, cube)
+
+
+def moved_place(z: Scalar, before: Sequence[Scalar], after: Sequence[Scalar]) -> Scalar:
+    """Where the law's shape has what this curve has at the reduced distance `z`, -; exactly `z` with zeros (`monotone_curve`)."""
+    return monotone_curve(before, after)(z)
