@@ -20,7 +20,7 @@ from smajax.attribution.findings import UnknownTerm, UnknownTermLikelier
 from smajax.attribution.formulas import formulas
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.unknown.ranges import Sought
-from smajax.attribution.unknown.search import Lacking, in_place_of, unknown_terms, with_terms
+from smajax.attribution.unknown.search import Lacking, _explains, in_place_of, unknown_terms, with_terms
 from smajax.attribution.unknown.spline import COUNT, design, spline
 from smajax.attribution.unknown.terms import UNKNOWN
 from smajax.core.parameters import parameters
@@ -195,6 +195,17 @@ def test_the_equation_of_a_hidden_term_is_ranked_first(equation: str, level: flo
     assert best.left_out_before > 1.2 * NOISE
     assert best.log_odds > 10.0
     assert best.samples.sum() == len(LEVELS) * SAMPLES
+
+
+@pytest.mark.parametrize(
+    ("with_it", "without", "named"),
+    [(1.5, 3.0, True), (2.9, 3.0, False), (3.1, 3.0, False), (1.02, 1.1, True), (1.09, 1.1, False), (0.98, 1.01, True)],
+)
+def test_a_function_is_named_where_it_explains_half_of_what_is_beyond_the_noise(
+    with_it: float, without: float, named: bool
+) -> None:
+    """Root mean squares on runs left out, in noises."""
+    assert _explains(with_it * NOISE, without * NOISE, NOISE) == named
 
 
 def test_the_learnt_function_is_the_hidden_one() -> None:

@@ -323,7 +323,11 @@ def test_the_checks_before_a_fit_are_messages_and_a_prior_without_use_is_a_warni
 
 
 def _with_terms(
-    named: bool, *others: str, held_out: tuple[float, float] | None = None, log_odds: float = 40.0
+    named: bool,
+    *others: str,
+    held_out: tuple[float, float] | None = None,
+    log_odds: float = 40.0,
+    left_out: float = 1.0,
 ) -> tuple[str, ...]:
     empty = np.zeros(0)
 
@@ -342,7 +346,7 @@ def _with_terms(
             log_odds=log_odds if first else -9.0,
             score_gain=0.5,
             left_out_before=2.0,
-            left_out_after=1.0,
+            left_out_after=left_out,
             held_out_before=held_out[0] if held_out and first else None,
             held_out_after=held_out[1] if held_out and first else None,
             at=empty,
@@ -365,7 +369,10 @@ def test_an_equation_is_named_only_if_no_other_explains_as_much() -> None:
     assert "or a stored heat" in _with_terms(True, "unknown_heat_of_fraction")[1]
     undecided = _with_terms(True, "unknown_reading_of_time")[1]
     assert "do not determine whether it is in the heat equation or the sensor equation" in undecided
-    assert "is likeliest, and predicts runs left out no better: likelier than none by 40.0" in _with_terms(False)[1]
+    no_better = _with_terms(False, left_out=2.1)[1]
+    assert "is likeliest, and predicts runs left out no better: likelier than none by 40.0" in no_better
+    little = _with_terms(False, left_out=1.8)[1]
+    assert "is likeliest, and explains less than half of what is missing in runs left out: likelier than none" in little
     none = _with_terms(False, log_odds=-2.0)[1]
     assert "Nor do these runs determine in which equation" in none
     assert "none is likelier than no function at all" in none

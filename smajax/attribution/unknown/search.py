@@ -42,6 +42,10 @@ from smajax.model.effects.candidate import PRIOR_ODDS
 from smajax.model.effects.prior_width import CoefficientPrior
 
 INDISTINGUISHABLE = 3.0  # in log odds: twenty to one
+# Of the likeliest's log odds over no term: seven splines leave about a hundredth of a function, and in which equation they leave
+# less of it says nothing.
+APPROXIMATE = 0.01
+EXPLAINED = 0.5  # of what is missing in runs left out: a function that explains less of it is not named, for the rest may be elsewhere
 PASSES = 2  # the error of a sample is first that of the model without a term, then that of the best with one
 MUCH = 7e4  # samples times directions of the derivative, of one fit
 REACH = 10.0  # in log odds behind the likeliest, within which a term is fitted again with the smaller error
@@ -154,8 +158,8 @@ def fits_with_terms(setting: Search, final: Model) -> TermFits | None:
 def unknown_terms(setting: Search, final: Model) -> Lacking:
     """An unknown term in each equation in turn, beside `final`.
 
-    The likeliest is `named` where it is likelier than none, predicts left-out runs better, and held-out runs too. Terms
-    that are likelier than none and less than `INDISTINGUISHABLE` behind it stand in `indistinguishable`.
+    The likeliest is `named` where it is likelier than none, explains `EXPLAINED` of what is missing in runs left out, and predicts held-out runs better too. Terms
+    that are likelier than none and less than `INDISTINGUISHABLE`, or `APPROXIMATE` of its log odds, behind it stand in `indistinguishable`.
     """
     fits = fits_with_terms(setting, final)
     return Lacking() if fits is None else learnt(setting, fits)
@@ -171,10 +175,11 @@ def learnt(setting: Search, fits: TermFits) -> Lacking:
     present = predicting(fits.joint, fits.none, error, noise, next(iter(program_of.values())))
     log_odds = [fits.log_odds(one, error) for one in fitted]
     likeliest = fitted[0]
+    behind = max(INDISTINGUISHABLE, APPROXIMATE * log_odds[0])
     alike = [
         model.effects[-1]
         for model, odds in zip(fitted[1:], log_odds[1:], strict=True)
-        if odds > max(0.0, log_odds[0] - INDISTINGUISHABLE)
+        if odds > max(0.0, log_odds[0] - behind)
     ]
     # The runs are left out of what is named, or may be in its place: refits take as long as the fits.
     predict = {
@@ -184,7 +189,8 @@ def learnt(setting: Search, fits: TermFits) -> Lacking:
     }
     # One run fits too well to name anything: there is none to predict.
     several = search.problem.batch.runs > 1
-    enough = log_odds[0] > 0.0 and several and predict[likeliest.effects[-1]] < present.left_out_rmse
+    enough = log_odds[0] > 0.0 and several
+    enough = enough and _explains(predict[likeliest.effects[-1]], present.left_out_rmse, noise)
     held_out = None
     if enough and search.held_out is not None:
         both = [present.values, likeliest.values]
@@ -206,6 +212,11 @@ def learnt(setting: Search, fits: TermFits) -> Lacking:
             )
         terms.append(term)
     return Lacking(tuple(terms), likeliest if enough else None)
+
+
+def _explains(with_it: float, without: float, noise: float) -> bool:
+    """Whether a function takes away `EXPLAINED` of the squares that the error on runs left out has beyond the noise; root mean squares, SI."""
+    return with_it < without and with_it**2 - noise**2 <= (1.0 - EXPLAINED) * (without**2 - noise**2)
 
 
 def joint_with_terms(setting: Search, search: Search, final: Model) -> JointParameters:

@@ -68,7 +68,13 @@ def _none_named(findings: Findings, best: UnknownTerm) -> str:
     if best.held_out_before is not None:
         return f"{tried} {best.title} is likeliest, and is not validated on the held-out runs: {why}."
     if best.log_odds > 0.0:
-        return f"{tried} {best.title} is likeliest, and predicts runs left out no better: {why}."
+        better = best.left_out_after is not None and best.left_out_after < best.left_out_before
+        but = (
+            "explains less than half of what is missing in runs left out"
+            if better
+            else "predicts runs left out no better"
+        )
+        return f"{tried} {best.title} is likeliest, and {but}: {why}."
     return f"{tried} none is likelier than no function at all. The nearest is {best.title}: {why}."
 
 
