@@ -175,12 +175,8 @@ def learnt(setting: Search, fits: TermFits) -> Lacking:
     present = predicting(fits.joint, fits.none, error, noise, next(iter(program_of.values())))
     log_odds = [fits.log_odds(one, error) for one in fitted]
     likeliest = fitted[0]
-    behind = max(INDISTINGUISHABLE, APPROXIMATE * log_odds[0])
-    alike = [
-        model.effects[-1]
-        for model, odds in zip(fitted[1:], log_odds[1:], strict=True)
-        if odds > max(0.0, log_odds[0] - behind)
-    ]
+    least = max(0.0, log_odds[0] - max(INDISTINGUISHABLE, APPROXIMATE * log_odds[0]))
+    alike = [model.effects[-1] for model, odds in zip(fitted[1:], log_odds[1:], strict=True) if odds > least]
     # The runs are left out of what is named, or may be in its place: refits take as long as the fits.
     predict = {
         model.effects[-1]: predicting(fits.joint, model, error, noise, program_of[model.effects[-1]]).left_out_rmse
@@ -214,9 +210,13 @@ def learnt(setting: Search, fits: TermFits) -> Lacking:
     return Lacking(tuple(terms), likeliest if enough else None)
 
 
+def _less(with_it: float | None, without: float) -> bool:
+    return with_it is not None and with_it < without
+
+
 def _explains(with_it: float, without: float, noise: float) -> bool:
     """Whether a function takes away `EXPLAINED` of the squares that the error on runs left out has beyond the noise; root mean squares, SI."""
-    return with_it < without and with_it**2 - noise**2 <= (1.0 - EXPLAINED) * (without**2 - noise**2)
+    return _less(with_it, without) and with_it**2 - noise**2 <= (1.0 - EXPLAINED) * (without**2 - noise**2)
 
 
 def joint_with_terms(setting: Search, search: Search, final: Model) -> JointParameters:
@@ -244,7 +244,7 @@ def in_place_of(setting: Search, first: Model, final: Model) -> Lacking | None:
     """One unknown term in the base model `first` that is likelier than the base model with all the effects of `final`.
 
     Then these are what the library has that comes near it, and none of them is missing: a round is noted in which they are
-    removed.
+    removed. Where the term explains too little to be named, they explain less.
     """
     fits = fits_with_terms(setting, first)
     if fits is None:
@@ -256,7 +256,9 @@ def in_place_of(setting: Search, first: Model, final: Model) -> Lacking | None:
     if ahead <= 0.0:
         return None
     found = learnt(setting, fits)
-    if found.likeliest is None:
+    best = found.terms[0]
+    little = best.log_odds > 0.0 and best.held_out_before is None and _less(best.left_out_after, best.left_out_before)
+    if found.likeliest is None and not little:
         return None
     setting.set_aside(final, UnknownTermLikelier(found.terms[0].title, ahead))
     return found
