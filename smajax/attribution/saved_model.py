@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 
 import jax.numpy as jnp
@@ -81,7 +82,7 @@ def _likely(job: Job, search: JointSearch, model: FittedModel, values: np.ndarra
     at = dict(zip(search.joint.problem.names, np.asarray(values).tolist(), strict=True))
     covariance = model.covariance(search.error(model) ** 2) * np.outer(model.scales, model.scales)
     declared = job.experiment.declared_effects
-    priors = search.joint.prior_records(model.effects)
+    priors = dataclasses.replace(search.joint, width_factors=model.width_factors).prior_records(model.effects)
     of_runs = OfRuns.among({name: at[name] for name in model.names})
     names, whole = of_runs.beside(model.names, covariance)
     shared = [name for name in model.names if not is_of_run(name)]

@@ -208,6 +208,11 @@ def test_a_value_of_a_preset_far_from_its_prior_is_reported_with_the_distance() 
     assert "edge_modulus" not in said
     page = findings_to_html(dataclasses.replace(made_findings(), after=after))
     assert "2.5 widths of its prior below the middle of that" in page
+    effect = made_findings().added[0].name
+    coefficient = dataclasses.replace(after[2], name=f"{effect}.size")  # of an effect that keeps its priors
+    said = _summary(after=(coefficient,))
+    assert f"Mind: {effect}.size ends 3.1 widths of its prior above" in said
+    assert "[priors.presets]" not in said
     at_its_bound = dataclasses.replace(after[2], remark=Remark(RemarkKind.UPPER_BOUND))
     assert "widen its bounds" not in _summary(after=(at_its_bound,))  # the file has none of it
 

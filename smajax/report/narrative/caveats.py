@@ -127,12 +127,16 @@ def of_bounds(findings: Findings) -> Iterator[str]:
 
 
 def of_priors_left(findings: Findings) -> Iterator[str]:
-    """Values of presets that end far from what data sheets leave open, and unknowns that end far from their priors."""
+    """Values of presets that end far from what data sheets leave open, and unknowns and coefficients that end far from their priors."""
+    added = tuple(f"{effect.name}." for effect in findings.added)
     texts = {one: text for one in findings.after if (text := far_text(findings, one))}
     own = [f"{one.name} ends {text}" for one, text in texts.items() if one.prior_of_unknown]
     if own:
         yield f"Mind: {and_listed(own)}. The runs contradict what the experiment file says of it, or it stands in for what the model lacks."
-    far = {one.name: text for one, text in texts.items() if not one.prior_of_unknown}
+    of_effects = [f"{one.name} ends {text}" for one, text in texts.items() if one.name.startswith(added)]
+    if of_effects:
+        yield f"Mind: {and_listed(of_effects)}. That is more of the effect than is likely: it may stand in for another."
+    far = {one.name: text for one, text in texts.items() if not one.prior_of_unknown and not one.name.startswith(added)}
     if not far:
         return
     ends = [f"{name} ends {text}" for name, text in far.items()]
