@@ -332,7 +332,7 @@ def _with_terms(
     *others: str,
     held_out: tuple[float, float] | None = None,
     log_odds: float = 40.0,
-    left_out: float = 1.0,
+    left_out: float | None = 1.0,
 ) -> tuple[str, ...]:
     empty = np.zeros(0)
 
@@ -375,9 +375,13 @@ def test_an_equation_is_named_only_if_no_other_explains_as_much() -> None:
     undecided = _with_terms(True, "unknown_reading_of_time")[1]
     assert "do not determine whether it is in the heat equation or the sensor equation" in undecided
     no_better = _with_terms(False, left_out=2.1)[1]
-    assert "is likeliest, and predicts runs left out no better: likelier than none by 40.0" in no_better
+    assert "is likeliest, but it predicts runs left out no better: likelier than none by 40.0" in no_better
     little = _with_terms(False, left_out=1.8)[1]
-    assert "is likeliest, and explains less than half of what is missing in runs left out: likelier than none" in little
+    assert (
+        "is likeliest, but it explains less than half of what is missing in runs left out: likelier than none" in little
+    )
+    of_one_run = _with_terms(False, left_out=None)[1]
+    assert "but one run, of which none can be left out, confirms no function: likelier than none by" in of_one_run
     none = _with_terms(False, log_odds=-2.0)[1]
     assert "Nor do these runs determine in which equation" in none
     assert "none is likelier than no function at all" in none

@@ -195,7 +195,7 @@ def learnt(setting: Search, fits: TermFits) -> Lacking:
         enough = compared(with_it, without, setting.config, held_out_owners(search)) != "worse"
     terms: list[UnknownTerm] = []
     for model, odds in zip(fitted, log_odds, strict=True):
-        left_out = present.left_out_rmse, predict.get(model.effects[-1])
+        left_out = present.left_out_rmse, predict.get(model.effects[-1]) if several else None
         term = _learnt(search, fits.sought, model, left_out, fits.gains[model.effects[-1]], odds)
         if not terms:
             before, after = held_out if held_out is not None else (None, None)

@@ -68,13 +68,13 @@ def _none_named(findings: Findings, best: UnknownTerm) -> str:
     if best.held_out_before is not None:
         return f"{tried} {best.title} is likeliest, and is not validated on the held-out runs: {why}."
     if best.log_odds > 0.0:
-        better = best.left_out_after is not None and best.left_out_after < best.left_out_before
-        but = (
-            "explains less than half of what is missing in runs left out"
-            if better
-            else "predicts runs left out no better"
-        )
-        return f"{tried} {best.title} is likeliest, and {but}: {why}."
+        if best.left_out_after is None:
+            but = "one run, of which none can be left out, confirms no function"
+        elif best.left_out_after < best.left_out_before:
+            but = "it explains less than half of what is missing in runs left out"
+        else:
+            but = "it predicts runs left out no better"
+        return f"{tried} {best.title} is likeliest, but {but}: {why}."
     return f"{tried} none is likelier than no function at all. The nearest is {best.title}: {why}."
 
 
