@@ -159,7 +159,7 @@ def _fits(setting: Search, host: Model, runs: Sequence[str]) -> list[tuple[_Even
     # Of a wrong record there is noise left when it is right; what comes nowhere near that in a few steps is none.
     excess = tuple((steps, max(share * squares, allowed)) for steps, share in MOST_SHARES)
     settings = replace(settings, allowed_excess=excess, least_cost=0.0, promised_excess=None, one_of_each=0)
-    fits = levenberg_marquardt(joint_problem, [task._replace(goal=allowed) for task in tasks], settings)
+    fits = levenberg_marquardt(joint_problem, tasks, settings)
     return [
         (
             _Event(kind.coefficient, run, float(fit.values[joint.slots[name]])),

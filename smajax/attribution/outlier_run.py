@@ -80,7 +80,8 @@ def _aimed(setting: Search, start: Start, ended: Fit, whole: np.ndarray) -> Star
     assert start.weights is not None
     others = start.weights[setting.problem.owner] > 0.0
     mask = np.asarray(setting.problem.batch.mask)[others]
-    told = [config.white_noise_ratio * noise]
+    # Of a noise that was estimated a larger residual may still be noise, where neighbouring samples are alike.
+    told = [config.white_noise_ratio * noise * (1.0 if setting.noise_given else config.outlier_reach)]
     if len(start.weights) >= config.influential_least_runs:
         told.append(_rms(whole[others], mask) / config.influential_ratio)
     return replace(start, values=ended.values, goal=float(mask.sum()) * (max(told) / noise) ** 2)

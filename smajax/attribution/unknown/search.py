@@ -148,7 +148,8 @@ def fits_with_terms(setting: Search, final: Model) -> TermFits | None:
         fitted = fitted_terms(search, joint, final.effects, places, error)
         error = least_error(setting, [none, *fitted])
         fitted.sort(key=lambda model: -model.log_evidence(error**2))
-        least = fitted[0].log_evidence(error**2) - REACH
+        best = fitted[0].log_evidence(error**2)
+        least = best - max(REACH, APPROXIMATE * (best - none.log_evidence(error**2)))
         fitted = [one for one in fitted if one.log_evidence(error**2) >= least]
         places = {one.effects[-1]: [one.values] for one in fitted}
     gains = {score.effects[0]: score.gain for score in scores}
@@ -244,7 +245,7 @@ def in_place_of(setting: Search, first: Model, final: Model) -> Lacking | None:
     """One unknown term in the base model `first` that is likelier than the base model with all the effects of `final`.
 
     Then these are what the library has that comes near it, and none of them is missing: a round is noted in which they are
-    removed. Where the term explains too little to be named, they explain less.
+    removed. So too where the term explains too little to be named, and they explain less and are far behind.
     """
     fits = fits_with_terms(setting, first)
     if fits is None:
@@ -257,7 +258,8 @@ def in_place_of(setting: Search, first: Model, final: Model) -> Lacking | None:
         return None
     found = learnt(setting, fits)
     best = found.terms[0]
-    little = best.log_odds > 0.0 and best.held_out_before is None and _less(best.left_out_after, best.left_out_before)
+    little = ahead > INDISTINGUISHABLE and best.log_odds > 0.0 and best.held_out_before is None
+    little = little and _less(best.left_out_after, min(best.left_out_before, final.left_out_rmse))
     if found.likeliest is None and not little:
         return None
     setting.set_aside(final, UnknownTermLikelier(found.terms[0].title, ahead))

@@ -50,7 +50,10 @@ class AbstractEffect(eqx.Module):
         return cls()
 
     def prepared(self) -> Self:
-        """The effect with what is of its coefficients alone computed: asked for once a run, before its first step."""
+        """The effect with what is of its coefficients alone computed: asked for once a run, before its first step.
+
+        Its coefficients are not to be replaced after that: what was computed of them stays.
+        """
         return self
 
 

@@ -135,7 +135,7 @@ def of_priors_left(findings: Findings) -> Iterator[str]:
         yield f"Mind: {and_listed(own)}. The runs contradict what the experiment file says of it, or it stands in for what the model lacks."
     of_effects = [f"{one.name} ends {text}" for one, text in texts.items() if one.name.startswith(added)]
     if of_effects:
-        yield f"Mind: {and_listed(of_effects)}. That is more of the effect than is likely: it may stand in for another."
+        yield f"Mind: {and_listed(of_effects)}. That is further than is likely: the effect may stand in for another."
     far = {one.name: text for one, text in texts.items() if not one.prior_of_unknown and not one.name.startswith(added)}
     if not far:
         return

@@ -44,7 +44,7 @@ def unknown_sentences(findings: Findings) -> tuple[str, ...]:
         equations = " or ".join(f"the {label(one)} equation" for one in (best.equation, *elsewhere))
         return (
             f"What is missing is not in the library, and these runs do not determine whether it is in {equations}: "
-            f"of smooth unknown functions put into one equation in turn, {_or_listed([best, *others])} are about equally likely. "
+            f"of smooth unknown functions put into one equation in turn, {_or_listed([best, *others])} do about equally well. "
             f"Likeliest is the first ({brought}).",
         )
     text = (
