@@ -48,8 +48,8 @@ def summary(findings: Findings) -> tuple[str, ...]:
         *caveats.of_the_noise(findings),
         *caveats.of_the_step(findings),
     ]
-    # After what was found.
-    place = 1 if findings.added else 0
+    # After what was found, or the one run that disagrees with the others.
+    place = 1 if findings.added or _in_one_run(findings) else 0
     sentences[place:place] = [*_unconfirmed(findings), *(_rejected(findings, one) for one in findings.rejected)]
     sentences += _errors(findings)
     sentences += caveats.of_bounds(findings)
