@@ -152,11 +152,11 @@ def _fits(setting: Search, host: Model, runs: Sequence[str]) -> list[tuple[_Even
         joint_problem.task(joint.free((*host.effects, name)), joint.bounds, begun)
         for name, begun in zip(events, nearest(joint_problem, groups), strict=True)
     ]
-    squares = float((left**2).sum()) / error**2
-    allowed = (MOST_LEFT * float(own.noise_sigma) / error) ** 2 * float(np.asarray(own.batch.mask).sum())
     settings = FitSettings(cache=setting.cache, progress=setting.progress)
     settings = comparison_settings(settings, "inputs of single runs")
     # Of a wrong record there is noise left when it is right; what comes nowhere near that in a few steps is none.
+    squares = float((left**2).sum()) / error**2
+    allowed = (MOST_LEFT * float(own.noise_sigma) / error) ** 2 * float(np.asarray(own.batch.mask).sum())
     excess = tuple((steps, max(share * squares, allowed)) for steps, share in MOST_SHARES)
     settings = replace(settings, allowed_excess=excess, least_cost=0.0, promised_excess=None, one_of_each=0)
     fits = levenberg_marquardt(joint_problem, tasks, settings)

@@ -77,27 +77,28 @@ def outlier_runs(setting: Search, model: Model, names: Sequence[str]) -> tuple[O
 def _aimed(setting: Search, start: Start, ended: Fit, whole: np.ndarray) -> Start:
     """Once more from where a fit has ended; one that comes neither to noise nor to an influential run's fall of the error says nothing."""
     config, noise = setting.config, float(setting.problem.noise_sigma)
-    assert start.weights is not None
-    others = start.weights[setting.problem.owner] > 0.0
-    mask = np.asarray(setting.problem.batch.mask)[others]
+    _, mask, fallen = _others(setting, start, whole)
     # Of a noise that was estimated a larger residual may still be noise, where neighbouring samples are alike.
-    told = [config.white_noise_ratio * noise * (1.0 if setting.noise_given else config.outlier_reach)]
-    if len(start.weights) >= config.influential_least_runs:
-        told.append(_rms(whole[others], mask) / config.influential_ratio)
-    return replace(start, values=ended.values, goal=float(mask.sum()) * (max(told) / noise) ** 2)
+    white = config.white_noise_ratio * noise * (1.0 if setting.noise_given else config.outlier_reach)
+    return replace(start, values=ended.values, goal=float(mask.sum()) * (max(white, fallen) / noise) ** 2)
 
 
 def _near(setting: Search, left: np.ndarray, start: Start, whole: np.ndarray) -> bool:
     """Whether a fit is within `outlier_reach` of noise in the runs that it has, or of an influential run's fall of their error."""
     config = setting.config
+    others, mask, fallen = _others(setting, start, whole)
+    error = _rms(left[others], mask) / config.outlier_reach
+    return error < max(fallen, config.white_noise_ratio * float(setting.problem.noise_sigma))
+
+
+def _others(setting: Search, start: Start, whole: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """Of a fit without a run: (which series it has, their mask, the error on them without an influential run, SI; 0 of too few runs to call one so)."""
+    config = setting.config
     assert start.weights is not None
     others = start.weights[setting.problem.owner] > 0.0
     mask = np.asarray(setting.problem.batch.mask)[others]
-    error = _rms(left[others], mask) / config.outlier_reach
-    influential = len(start.weights) >= config.influential_least_runs and error * config.influential_ratio < _rms(
-        whole[others], mask
-    )
-    return influential or error < config.white_noise_ratio * float(setting.problem.noise_sigma)
+    enough = len(start.weights) >= config.influential_least_runs
+    return others, mask, _rms(whole[others], mask) / config.influential_ratio if enough else 0.0
 
 
 def _rms(misfit: np.ndarray, mask: np.ndarray) -> float:

@@ -17,7 +17,7 @@ from smajax.model.effects.smooth_transformation import SmoothTransformation
 from smajax.model.effects.transformation_curve import TransformationCurve, branch_shape
 from smajax.model.effects.two_part_transformation import TwoPartTransformation
 from smajax.model.effects.two_step_transformation import TwoStepTransformation
-from smajax.model.wire.monotone_curve import KNOTS, moved_place
+from smajax.model.wire.monotone_curve import KNOTS, monotone_curve
 from smajax.model.wire.shape import Cosine
 
 COEFFICIENT = st.floats(-3.0, 3.0)
@@ -40,7 +40,7 @@ def _knots(s: list[float]) -> np.ndarray:
 @jax.jit
 def _places(s: jax.Array, z: jax.Array) -> tuple[jax.Array, jax.Array]:
     """(the map and its slope) at every z."""
-    place = lambda one: moved_place(one, tuple(s[:3]), tuple(s[3:]))  # noqa: E731
+    place = monotone_curve(tuple(s[:3]), tuple(s[3:]))
     return jax.vmap(place)(z), jax.vmap(jax.grad(place))(z)
 
 
@@ -175,7 +175,7 @@ def test_prepared_the_effect_has_the_same_places_and_derivatives_on_either_branc
 
 def test_derivatives_of_the_map_agree_with_differences() -> None:
     """By its coefficients and by z, and the mixed second ones, away from the knots."""
-    place = lambda s, z: moved_place(z, tuple(s[:3]), tuple(s[3:]))  # noqa: E731
+    place = lambda s, z: monotone_curve(tuple(s[:3]), tuple(s[3:]))(z)  # noqa: E731
     slope, mixed = jax.jit(jax.grad(place, (0, 1))), jax.jit(jax.jacobian(jax.grad(place, 1), 0))
     drawn = np.random.default_rng(7)
     for s, z in zip(0.7 * drawn.standard_normal((20, 6)), drawn.uniform(-0.5, 1.5, 20), strict=True):

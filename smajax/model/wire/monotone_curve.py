@@ -132,8 +132,3 @@ def monotone_curve(before: Sequence[Scalar], after: Sequence[Scalar]) -> Monoton
     rising, falling = slope[:-1], slope[1:]
     square, cube = (3.0 * chord - 2.0 * rising - falling) / width, (rising + falling - 2.0 * chord) / (width * width)
     return MonotoneCurve(knots, width, further[0], slope[0], slope[-1], rising, square, cube)
-
-
-def moved_place(z: Scalar, before: Sequence[Scalar], after: Sequence[Scalar]) -> Scalar:
-    """Where the law's shape has what this curve has at the reduced distance `z`, -; exactly `z` with zeros (`monotone_curve`)."""
-    return monotone_curve(before, after)(z)
