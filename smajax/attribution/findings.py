@@ -77,6 +77,11 @@ class ParameterFinding:
         """Whether it ends at a bound that it might lie beyond: a share of all or of nothing is not."""
         return self.remark.at_bound and (self.unit, self.lower, self.upper) != ("-", 0.0, 1.0)
 
+    @property
+    def at_zero(self) -> bool:
+        """Whether it ends at the end of its range that is zero: an effect with such a coefficient is off."""
+        return self.limited and self.lower == 0.0 and self.value < 0.5 * self.upper
+
 
 @dataclass(frozen=True)
 class AssumedParameter:
@@ -325,6 +330,12 @@ class Findings:
     def added(self) -> tuple[EffectFinding, ...]:
         """The effects of the final model."""
         return tuple(effect for effect in self.effects if effect.added)
+
+    @property
+    def coefficients_at_bounds(self) -> tuple[ParameterFinding, ...]:
+        """Coefficients of added effects that end at a bound of their range, but for those at a zero where the effect is off."""
+        added = tuple(f"{effect.name}." for effect in self.added)
+        return tuple(one for one in self.after if one.limited and one.name.startswith(added) and not one.at_zero)
 
     @property
     def fit_runs(self) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Sized
 
 
 def counted(number: int, what: str) -> str:
@@ -31,6 +31,11 @@ def and_listed(names: Sequence[str]) -> str:
         return names[0] if names else "nothing"
     between = "; " if any("," in name for name in names) else ", "
     return f"{between.join(names[:-1])} and {names[-1]}"
+
+
+def verdict_text(verdict: str, coefficients_at_bounds: Sized) -> str:
+    """`explained`; `explained, at a bound` where coefficients of what was added end at a bound."""
+    return f"{verdict}, at a bound" if coefficients_at_bounds else verdict
 
 
 def aligned(rows: Sequence[Sequence[str]], right: bool = False) -> list[str]:

@@ -12,7 +12,7 @@ from markupsafe import Markup
 from smajax.attribution.findings import Findings, ParameterFinding, Role, coverage, pooled_rmse
 from smajax.core.display_units import chance, correlation, digits, display, label, p_value, with_error
 from smajax.core.names_of_runs import is_of_run, parameter_of
-from smajax.core.wording import and_listed, per_cent
+from smajax.core.wording import and_listed, per_cent, verdict_text
 from smajax.fit.uncertainty import RemarkKind
 from smajax.report import pictures, run_plots
 from smajax.report.embedded import picture
@@ -23,7 +23,7 @@ from smajax.report.narrative import Narrative, narrate
 from smajax.report.narrative.rounds import chosen_text
 from smajax.report.narrative.unknown import units
 from smajax.report.narrative.values import far_text
-from smajax.report.narrative.verdict import VERDICTS
+from smajax.report.narrative.verdict import headline
 from smajax.report.next_steps import Step, section
 from smajax.report.plain_page import MANY, breakable
 from smajax.report.series_picture import COARSE, series, series_of_runs
@@ -170,7 +170,13 @@ def _figures(findings: Findings, output: Callable[[float | None], Shown]) -> lis
     if findings.noise_sigma > 0.0:
         ratio = pooled_rmse(findings.runs, "fit", "after") / findings.noise_sigma
         figures.append({"caption": "times the noise", "text": digits(ratio, 3)})
-    figures.append({"caption": "verdict", "text": str(findings.verdict), "kind": "verdict"})
+    figures.append(
+        {
+            "caption": "verdict",
+            "text": verdict_text(findings.verdict, findings.coefficients_at_bounds),
+            "kind": "verdict",
+        }
+    )
     inside = coverage(findings)
     if inside is not None:
         figures.append({"caption": "held-out samples in the 90 % band", "text": per_cent(inside)})
@@ -266,7 +272,7 @@ def _unknown(findings: Findings) -> list[dict[str, Any]]:
 def findings_to_html(findings: Findings, narrative: Narrative | None = None, steps: Sequence[Step] = ()) -> str:
     """The whole page, as text. Names and sentences of the record are escaped; numbers are those of the record. steps: what a reader may do next."""
     words = narrative or narrate(findings)
-    title, tone = VERDICTS[findings.verdict]
+    title, tone = headline(findings)
 
     def output(value: float | None) -> Shown:
         return shown(value, findings.output_unit, findings.output_name, 3, zeros=True)

@@ -16,6 +16,7 @@ from urllib.parse import quote
 
 from smajax.core.display_units import digits, display, label
 from smajax.core.files import replace
+from smajax.core.wording import verdict_text
 from smajax.report.json_file import with_current_keys
 from smajax.report.next_steps import MODEL, Step, after_reports, section
 from smajax.report.plain_page import bullets, table, whole
@@ -52,6 +53,7 @@ class ReportRow:
     held_out_before: float | None
     held_out_after: float | None
     written: float  # s since 1970: when the record was written
+    coefficients_at_bounds: tuple[str, ...] = ()  # of those effects
 
     @property
     def noises(self) -> float | None:
@@ -87,6 +89,7 @@ def read_report(path: Path, searched: Path) -> ReportRow:
             unit=str(record["output"]["unit"]),
             noise=record["output"]["noise_sigma"],
             written=path.stat().st_mtime,
+            coefficients_at_bounds=tuple(map(str, record.get("coefficients_at_bounds", ()))),
             **errors,
         )
     except (AttributeError, KeyError, TypeError, ValueError) as error:
@@ -116,7 +119,7 @@ def cells(row: ReportRow) -> list[str]:
     errors = (row.fit_before, row.fit_after, row.held_out_before, row.held_out_after)
     return [
         row.title,
-        row.verdict,
+        verdict_text(row.verdict, row.coefficients_at_bounds),
         *map(error, errors),
         digits(row.noises, 3, zeros=True),
         ", ".join(map(label, row.effects)) or "–",

@@ -183,11 +183,13 @@ def _round(entry: Round, why: str) -> dict[str, Any]:
 def findings_to_json(findings: Findings, narrative: Narrative | None = None) -> dict[str, Any]:
     """The record without its time series, ready for `json.dumps(..., allow_nan=False)`."""
     words = narrative or narrate(findings)
+    at_bounds = [one.name for one in findings.coefficients_at_bounds]
     record = {
         "experiment": findings.experiment,
         "title": findings.title,
         "source": findings.source,
         "verdict": findings.verdict,
+        **({"coefficients_at_bounds": at_bounds} if at_bounds else {}),
         "remaining": findings.remaining,
         "effects_excluded": findings.effects_excluded,
         "summary": words.summary,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -225,3 +226,13 @@ def test_logs_of_another_folder_join_the_experiment(folder: Path, client: TestCl
         ("second", "second.csv", None),
     ]
     assert state(folder).examined.errors == {}
+
+
+def test_a_result_that_ends_at_a_bound_is_not_green(folder: Path, client: TestClient) -> None:
+    (folder / "report").mkdir()
+    (folder / "report" / "report.html").write_text("", encoding="utf-8")
+    record = {"verdict": "explained", "coefficients_at_bounds": ["wrong_load.share"], "runs": []}
+    (folder / "report" / "report.json").write_text(json.dumps(record), encoding="utf-8")
+    page = client.get("/result").text
+    assert "Verdict: explained, at a bound" in page
+    assert '<section class="answer fair">' in page

@@ -10,6 +10,9 @@ from smajax.app.pages.fit import COMMANDS
 from smajax.app.project import Project, Result
 from smajax.app.step import Step
 from smajax.core.display_units import digits, display
+from smajax.core.wording import verdict_text
+
+TONES = {"adequate": "good", "explained": "good", "partly explained": "fair"}
 
 
 def _runs(record: Mapping[str, Any]) -> list[dict[str, str]]:
@@ -34,10 +37,12 @@ def _runs(record: Mapping[str, Any]) -> list[dict[str, str]]:
 def shown(project: Project, result: Result) -> dict[str, Any]:
     """What the page says of one result folder."""
     record = project.record_of(result)
+    at_bounds = record.get("coefficients_at_bounds") or []
     return {
         "result": result,
         "title": record.get("title", ""),
-        "verdict": record.get("verdict", ""),
+        "verdict": verdict_text(record.get("verdict", ""), at_bounds),
+        "tone": "fair" if at_bounds else TONES.get(record.get("verdict", ""), "plain"),
         "remaining": record.get("remaining", ""),
         "sentences": record.get("summary") or record.get("conclusions") or [],
         "runs": _runs(record) if result.command == "close-loop" else [],

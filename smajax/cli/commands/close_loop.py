@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Sequence, Sized
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -82,8 +82,14 @@ def _rounds_shown(out: Path) -> int:
 def print_findings(findings: Findings, page: Path) -> None:
     from smajax.report.narrative import narrate
 
-    typer.echo(f"\n{findings.title}\nVerdict: {findings.verdict}")
-    for sentence in narrate(findings).summary:
+    _print_answer(findings.title, findings.verdict, findings.coefficients_at_bounds, narrate(findings).summary, page)
+
+
+def _print_answer(title: str, verdict: str, at_bounds: Sized, summary: Sequence[str], page: Path) -> None:
+    from smajax.core.wording import verdict_text
+
+    typer.echo(f"\n{title}\nVerdict: {verdict_text(verdict, at_bounds)}")
+    for sentence in summary:
         typer.echo(f"  {sentence}")
     typer.echo(f"Report: {page.resolve()}")
 
@@ -108,10 +114,8 @@ def _within(seconds: float, out: Path, json_out: bool) -> None:
     if json_out:
         typer.echo(json.dumps(known))
     else:
-        typer.echo(f"\n{known['title']}\nVerdict: {known['verdict']}")
-        for sentence in known["summary"]:
-            typer.echo(f"  {sentence}")
-        typer.echo(f"Report: {(out / 'report.html').resolve()}")
+        at_bounds = known.get("coefficients_at_bounds", [])
+        _print_answer(known["title"], known["verdict"], at_bounds, known["summary"], out / "report.html")
     typer.echo(f"The time was over before: {known['remaining'] or 'the controllers were tuned'}; {resumes}.", err=True)
     raise typer.Exit(UNMET)
 

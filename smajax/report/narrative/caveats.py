@@ -9,6 +9,7 @@ import numpy as np
 from smajax.attribution.findings import (
     EffectFinding,
     Findings,
+    ParameterFinding,
     RunFinding,
     Verdict,
     other_outputs,
@@ -98,27 +99,34 @@ def of_the_step(findings: Findings) -> list[str]:
     ]
 
 
+def _ends(parameter: ParameterFinding) -> str:
+    """`recoverable_strain ends at its upper bound of 2 %`."""
+    value = value_text(parameter.value, parameter.unit, parameter.name).strip()
+    return f"{parameter.name} ends {remark_text(parameter.remark)} of {value}"
+
+
+def of_coefficients_at_bounds(findings: Findings) -> Iterator[str]:
+    """That an effect which was added is not to be taken for found: a coefficient of it ends at a bound."""
+    if ends := [_ends(one) for one in findings.coefficients_at_bounds]:
+        why = (
+            "it stands in for something else, or its range is"
+            if len(ends) == 1
+            else "they stand in for something else, or their ranges are"
+        )
+        yield f"Mind: {and_listed(ends)}: {why} too narrow."
+
+
 def of_bounds(findings: Findings) -> Iterator[str]:
-    """Coefficients of what was added, and parameters of the base model, that end at a bound."""
+    """Coefficients of what was added that end at zero, and parameters of the base model that end at a bound."""
     added = tuple(f"{effect.name}." for effect in findings.added)
-    limited = [one for one in findings.after if one.limited]
-    of_effects = [one for one in limited if one.name.startswith(added)]
-    off = [one.name for one in of_effects if one.lower == 0.0 and one.value < 0.5 * one.upper]
+    off = [one.name for one in findings.after if one.at_zero and one.name.startswith(added)]
     if off:
         yield f"Mind: {and_listed(off)} {'ends' if len(off) == 1 else 'end'} at zero, where the effect is off: the runs ask for none of it."
-    coefficients = [one.name for one in of_effects if one.name not in off]
-    if coefficients:
-        yield (
-            f"Mind: {and_listed(coefficients)} {'ends' if len(coefficients) == 1 else 'end'} at a bound. The runs ask for more of the "
-            "effect than is likely: it may stand in for another."
-        )
     # A value of a preset has no bounds in the file (`of_priors_left`).
-    own = [one for one in limited if not one.name.startswith(added) and not far_text(findings, one)]
+    own = [one for one in findings.after if one.limited and not one.name.startswith(added)]
+    own = [one for one in own if not far_text(findings, one)]
     if own:
-        ends = [
-            f"{one.name} ends {remark_text(one.remark)} of {value_text(one.value, one.unit, one.name).strip()}"
-            for one in own
-        ]
+        ends = [_ends(one) for one in own]
         its = "its bounds" if len(own) == 1 else "their bounds"
         yield (
             f"Mind: {and_listed(ends)}. The truth may lie beyond, and what was fitted beside it makes up for that: widen "

@@ -38,11 +38,21 @@ VERDICTS = {
 }
 
 
+AT_A_BOUND = ("Explained, but by what ends at a bound", "fair")
+
+
+def headline(findings: Findings) -> tuple[str, str]:
+    """(headline of the page, its tone): an effect with a coefficient at a bound is not what a reader may trust."""
+    if findings.verdict is Verdict.EXPLAINED and findings.coefficients_at_bounds:
+        return AT_A_BOUND
+    return VERDICTS[findings.verdict]
+
+
 def summary(findings: Findings) -> tuple[str, ...]:
     """The answer first, then what makes it doubtful, the errors, what each effect means, and what was not found."""
     outliers = [] if _in_one_run(findings) else caveats.of_an_outlier(findings)
     sentences = [
-        _opening(findings),
+        " ".join([_opening(findings), *caveats.of_coefficients_at_bounds(findings)]),
         *of_wrong_records(findings),
         *outliers,
         *caveats.of_the_noise(findings),
@@ -155,7 +165,8 @@ def _explained(findings: Findings) -> str:
     if findings.fit_runs > 1 or any(run.role == "held-out" for run in findings.runs):
         off = caveats.held_out_off(findings)
         but = f", but not on {and_listed([run.name for run in off])}, held out: more may be missing" if off else ""
-        return f"The base model lacks: {listed}. With it, what is left on the fit runs is measurement noise{but}."
+        lacks = "may lack" if findings.coefficients_at_bounds else "lacks"
+        return f"The base model {lacks}: {listed}. With it, what is left on the fit runs is measurement noise{but}."
     return (
         f"The base model may lack: {listed}. With it, what is left on the one fit run is measurement noise. No run was "
         "left out or held out, so nothing confirms it."

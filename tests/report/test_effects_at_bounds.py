@@ -1,0 +1,59 @@
+"""An effect with a coefficient at a bound of its range is not shown as a trusted answer: on the page, in the terminal, in the list of reports."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from smajax.cli.commands.close_loop import print_findings
+from smajax.fit.uncertainty import Remark, RemarkKind
+from smajax.report.html import findings_to_html
+from smajax.report.index_page import cells, read_reports
+from smajax.report.json_file import findings_to_json
+from smajax.report.narrative import narrate
+from tests.helpers.made_findings import made_findings
+
+
+@pytest.mark.usefixtures("blank_pictures")
+def test_an_effect_that_ends_at_a_bound_is_not_shown_as_a_trusted_answer() -> None:
+    findings = made_findings()
+    assert '<header class="answer good"' in findings_to_html(findings)
+    assert "coefficients_at_bounds" not in findings_to_json(findings)
+    at_its_bound = dataclasses.replace(findings.after[-1], value=1e5, remark=Remark(RemarkKind.UPPER_BOUND))
+    findings = dataclasses.replace(findings, after=(*findings.after[:-1], at_its_bound))
+    first = narrate(findings).summary[0]
+    assert first.startswith("The base model may lack: latent heat of transformation.")
+    assert "latent_heat.enthalpy ends at its upper bound of 100 J/g" in first
+    page = findings_to_html(findings)
+    assert '<header class="answer fair"' in page
+    assert "<h1>Explained, but by what ends at a bound: latent heat of transformation</h1>" in page
+    assert "The missing physics is found" not in page
+    assert "<dd>explained, at a bound</dd>" in page
+    assert findings_to_json(findings)["coefficients_at_bounds"] == ["latent_heat.enthalpy"]
+    # At zero the effect is off: nothing is asked of it, and nothing stands in.
+    off = dataclasses.replace(at_its_bound, value=0.0, remark=Remark(RemarkKind.LOWER_BOUND))
+    findings = dataclasses.replace(findings, after=(off,))
+    assert findings.coefficients_at_bounds == ()
+    assert "latent_heat.enthalpy ends at zero, where the effect is off" in " ".join(narrate(findings).summary)
+
+
+def test_the_terminal_says_beside_the_verdict_that_an_effect_ends_at_a_bound(capsys: Any, tmp_path: Path) -> None:
+    at_its_bound = dataclasses.replace(made_findings().after[-1], value=1e5, remark=Remark(RemarkKind.UPPER_BOUND))
+    print_findings(dataclasses.replace(made_findings(), after=(at_its_bound,)), tmp_path / "report.html")
+    verdict, sentence = capsys.readouterr().out.splitlines()[2:4]
+    assert verdict == "Verdict: explained, at a bound"
+    assert "ends at its upper bound of 100 J/g: it stands in for something else" in sentence
+
+
+def test_the_list_of_reports_says_it_beside_the_verdict(tmp_path: Path) -> None:
+    at_its_bound = dataclasses.replace(made_findings().after[-1], value=1e5, remark=Remark(RemarkKind.UPPER_BOUND))
+    for name, after in (("found", made_findings().after), ("limited", (at_its_bound,))):
+        (tmp_path / name).mkdir()
+        record = findings_to_json(dataclasses.replace(made_findings(), after=after))
+        (tmp_path / name / "report.json").write_text(json.dumps(record), encoding="utf-8")
+    rows, _ = read_reports(tmp_path)
+    assert [cells(row)[1] for row in rows] == ["explained", "explained, at a bound"]
