@@ -67,7 +67,10 @@ def _at(system: System, values: Mapping[str, float]) -> System:
 def _scale(system: System) -> Scale:
     """Of a wire all martensite, in still air: tau = rho c_p d / (4 h), T - T_inf = P / (h pi d) at rest (eq. 3.1)."""
     wire, heat = system.wire, system.wire.heat
-    resistance = resistance_per_metre(wire, (), heat.ambient_temperature, jnp.ones(()))
+    martensite, austenite = (
+        resistance_per_metre(wire, (), heat.ambient_temperature, jnp.full((), fraction)) for fraction in (1.0, 0.0)
+    )
+    ohms = sorted(float(one * wire.wire_length) for one in (martensite, austenite))
     cooling = heat.convection_coefficient * jnp.pi * wire.wire_diameter
 
     def warming(inputs: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -75,7 +78,7 @@ def _scale(system: System) -> Scale:
         # Of a length that many logs share: JAX compiles each of its operations for each.
         more = (1 << max(count - 1, 0).bit_length()) - count
         given = {name: jnp.asarray(np.pad(values, (0, more), mode="edge")) for name, values in inputs.items()}
-        found = np.asarray(heating_power(system, resistance, given) / cooling, dtype=np.float64)
+        found = np.asarray(heating_power(system, martensite, given) / cooling, dtype=np.float64)
         return found[:count] if found.ndim else found
 
     return Scale(
@@ -84,6 +87,7 @@ def _scale(system: System) -> Scale:
         float(mass_per_metre(wire) * heat.specific_heat / cooling),
         warming,
         system.load.reading[0],
+        (ohms[0], ohms[1]),
     )
 
 

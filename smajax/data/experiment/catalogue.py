@@ -44,6 +44,7 @@ class Scale:
 
     wire_length: m. ambient: degC. time_constant: s, of the wire's temperature. warming: inputs (n,) -> the degrees above
     the air (n,) at which the wire comes to rest under each. own: the output that the load's own sensor shows, which rises with heat.
+    resistance: ohm, of the whole wire, the least and the most of both phases; zero where it is not known.
     """
 
     wire_length: float
@@ -51,6 +52,7 @@ class Scale:
     time_constant: float
     warming: Callable[[Mapping[str, NDArray[np.float64]]], NDArray[np.float64]]
     own: str = "position"
+    resistance: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True)

@@ -335,7 +335,9 @@ def experiment_of(path: Path, file: ExperimentFile, catalogue: Catalogue) -> Exp
     outputs = [_output(path, file, name, units[name], _of_fit(runs)) for name in output_names]
     warnings = _log_warnings(file, reading, runs, outputs)
     heats = sorted(model.heats & runs[0].run.inputs.keys())
-    warnings += magnitude_warnings(runs, None if model.scale is None else model.scale(values), heats, reading.step)
+    zeroed = {output.name for output, _ in outputs if output.offset}
+    scale = None if model.scale is None else model.scale(values)
+    warnings += magnitude_warnings(runs, scale, heats, reading.step, zeroed)
     warnings += _useless(file, model) + not_tried + _untold(file, free)
     warnings += [] if kept else preset_warnings(file.model.wire, free, model.parameters)
     warnings += role_warnings(file.runs)

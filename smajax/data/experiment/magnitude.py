@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
@@ -10,6 +10,7 @@ import scipy  # its parts are imported when they are first used
 
 from smajax.data.experiment.catalogue import Scale
 from smajax.data.experiment.column_guess import in_levels
+from smajax.data.experiment.declared_quantities import quantity_warnings
 from smajax.data.experiment.signals import ReadRun
 from smajax.data.readers.table import Array
 
@@ -215,11 +216,14 @@ def common_warnings(runs: Sequence[ReadRun]) -> list[str]:
     return result
 
 
-def magnitude_warnings(runs: Sequence[ReadRun], scale: Scale | None, heats: Sequence[str], step: float) -> list[str]:
-    """All of them. scale: of the model at its known values and starts; heats: the inputs that heat the wire."""
+def magnitude_warnings(
+    runs: Sequence[ReadRun], scale: Scale | None, heats: Sequence[str], step: float, offset: Collection[str] = ()
+) -> list[str]:
+    """All of them. scale: of the model at its known values and starts; heats: the inputs that heat the wire; offset: outputs with a zero of their own in each run."""
     result = [*_size_warnings(runs), *_exchange_warnings(runs, heats)]
     if scale is not None:
         result += [*_heating_warnings(runs, scale, heats), *_stroke_warnings(runs, scale)]
+        result += quantity_warnings(runs, scale, heats, step, offset)
         if heats:
             following = _following(runs, scale, heats, step)
             result += [
