@@ -30,6 +30,7 @@ from smajax.data.experiment.plausibility import (
     run_warnings,
 )
 from smajax.data.experiment.record import Experiment, FromModelFile, Output, Run, Unknown
+from smajax.data.experiment.recorded_ambient import AMBIENT, ambient_warnings
 from smajax.data.experiment.schema import ExperimentFile, read_schema
 from smajax.data.experiment.shared_columns import check_columns
 from smajax.data.experiment.signals import Reading, ReadRun, read_run, time_unit
@@ -338,6 +339,7 @@ def experiment_of(path: Path, file: ExperimentFile, catalogue: Catalogue) -> Exp
     zeroed = {output.name for output, _ in outputs if output.offset}
     scale = None if model.scale is None else model.scale(values)
     warnings += magnitude_warnings(runs, scale, heats, reading.step, zeroed)
+    warnings += ambient_warnings(runs, file.channels.get(AMBIENT), scale, heats, reading.step)
     warnings += _useless(file, model) + not_tried + _untold(file, free)
     warnings += [] if kept else preset_warnings(file.model.wire, free, model.parameters)
     warnings += role_warnings(file.runs)
