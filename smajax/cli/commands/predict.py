@@ -41,6 +41,7 @@ def predict_command(
     """Predict measured runs with a fitted model, and show the error, the band and where the model extrapolates.
 
     Columns are those of the logs that the model was fitted to; where a log has others they are guessed, as by `new-experiment`.
+    Of a log that lacks a sensor which the model was fitted to, the others are compared, and the output that is missing is predicted alone.
     Nothing is fitted, but for the zero of a sensor that has one in each run; it is that of the average of the likely models.
 
     Example:  smajax predict report/model.toml logs/ramp.csv --out predicted

@@ -15,6 +15,7 @@ from smajax.data.experiment.record import Experiment
 from smajax.data.experiment.schema import DataSection, ExperimentFile, LogFormat, ModelSection, RunSection
 from smajax.data.experiment.toml_file import Quantity, quantity, validated
 from smajax.data.model_catalogue import CATALOGUE
+from smajax.data.model_file.outputs_there import by_outputs_there, with_outputs_of_model
 from smajax.data.model_file.record import ModelRecord
 from smajax.data.readers.table import MeasuredDataError
 
@@ -28,7 +29,8 @@ def read_logs(
 ) -> tuple[Experiment, tuple[str, ...]]:
     """(the logs as runs of the model, a message for each guess about them).
 
-    A log is read by the channels in the model's file; where it has no such columns, by a guess at its own. inputs: constants that no
+    A log is read by the channels in the model's file; where it has no such columns, by a guess at its own, and where that fails by those of
+    the channels that it has, with one output at least. An output of the model that a log has not is one without a sample there. inputs: constants that no
     log has, as `{"mass": "0.2 kg"}`. parameters: values of these runs that replace the model's. decimal: the decimal mark, where the
     logs do not determine it. Raises ExperimentError, whose message names the file.
     """
@@ -51,19 +53,28 @@ def read_logs(
         lacking = _lacking(model, file, constants)
         if not lacking:
             runs = [run.model_copy(update={"inputs": constants, "parameters": own, "role": "fit"}) for run in file.runs]
-            return _experiment(model, file.log_format, folder, runs, decimal), messages
+            found, not_there = with_outputs_of_model(model, _experiment(model, file.log_format, folder, runs, decimal))
+            return found, (*messages, *not_there)
+        refused = ExperimentError(
+            paths[0],
+            "",
+            f"no column for the input {lacking!r}, which the runs that the model was fitted to have; rename the column, or give a constant "
+            f"with --input {lacking}=...",
+        )
     except (ExperimentError, MeasuredDataError) as error:
-        if missed is not None:
-            raise missed from None
-        raise ExperimentError(
+        refused = missed or ExperimentError(
             paths[0], "", f"{error}; or give an experiment file, which says what its columns are"
-        ) from None
-    raise ExperimentError(
-        paths[0],
-        "",
-        f"no column for the input {lacking!r}, which the runs that the model was fitted to have; rename the column, or give a constant "
-        f"with --input {lacking}=...",
-    )
+        )
+    there = None
+    if missed is not None and model.log_format is not None:
+        runs = _runs(paths, folder, constants, own)
+        known_format = model.log_format.model_copy(update={"decimal": decimal or model.log_format.decimal})
+        there = by_outputs_there(
+            known_format, runs, folder, lambda known, some: _experiment(model, known, folder, some, decimal)
+        )
+    if there is None:
+        raise refused
+    return with_outputs_of_model(model, there)
 
 
 def _runs(
