@@ -92,9 +92,12 @@ def _beside(new: Compared, old: Compared, setting: Search, which: Literal["befor
 
 def _simulated(
     setting: Search, model: Model | FittedModel, batch: RunBatch, runs: Sequence[str]
-) -> tuple[Trajectory, np.ndarray]:
+) -> tuple[Trajectory, np.ndarray, dict[str, dict[str, float]]]:
+    """(trajectories, sensors' outputs, values of each run's own by its name)."""
     there, (values,) = on_runs(setting, model.effects, [model.values], batch, runs)
-    return simulate_with_outputs(there.system_at(jnp.asarray(values)), there.with_own_values(values))
+    own = np.asarray(there.per_run_at(jnp.asarray(values))).tolist()
+    named = {run: dict(zip(there.per_run.names, row, strict=True)) for run, row in zip(runs, own, strict=True)}
+    return *simulate_with_outputs(there.system_at(jnp.asarray(values)), there.with_own_values(values)), named
 
 
 def every_run(job: Job) -> RunBatch:
@@ -108,15 +111,18 @@ def compare(job: Job, setting: Search, first: Model, final: Model | FittedModel)
     experiment, batch = job.experiment, every_run(job)
     names = [run.name for run in experiment.runs]
     simulated = {which: _simulated(setting, one, batch, names) for which, one in (("before", first), ("after", final))}
-    shown = {which: states_by_run(one, experiment.runs, SHOWN) for which, (one, _) in simulated.items()}
+    shown = {which: states_by_run(one, experiment.runs, SHOWN) for which, (one, *_) in simulated.items()}
     runs = []
     residuals: dict[str, list[np.ndarray]] = {"before": [], "after": []}
     states: dict[str, list[dict[str, np.ndarray]]] = {"before": [], "after": []}
     outputs: dict[str, list[str]] = {"before": [], "after": []}  # of each residual
     count = len(experiment.outputs)
     for index, run in enumerate(experiment.runs):
-        readings = {which: one[index * count : (index + 1) * count] for which, (_, one) in simulated.items()}
+        readings = {which: one[index * count : (index + 1) * count] for which, (_, one, _) in simulated.items()}
         found = _run_finding(experiment, run, readings, shown["after"][run.name])
+        if found.role == "held-out":
+            own = {which: one[run.name] for which, (*_, one) in simulated.items()}
+            found = replace(found, own_before=own["before"], own_after=own["after"])
         runs.append(found)
         if found.role == "fit":
             for which in states:

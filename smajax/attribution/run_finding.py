@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -63,6 +63,10 @@ class RunFinding(BesideModels):
     inputs: dict[str, np.ndarray]  # SI, by channel name
     states: dict[str, np.ndarray]  # of the model after: temperature (C), martensite_fraction (-), stress (Pa)
     others: tuple[OutputFinding, ...] = ()  # the other outputs, where there are several
+    # Parameter -> its value of this run's own, of a held-out run, which was fitted to it alone by each of the models; those of fit runs are
+    # parameters of the fit.
+    own_before: dict[str, float] = field(default_factory=dict)
+    own_after: dict[str, float] = field(default_factory=dict)
 
     def residuals(self, which: Literal["before", "after"]) -> list[np.ndarray]:
         """What a model leaves of the measured samples of every output, those of others in noises times the first one's."""

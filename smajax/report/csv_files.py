@@ -9,6 +9,7 @@ import numpy as np
 
 from smajax.attribution.findings import Findings, ParameterFinding
 from smajax.core.files import csv_text, heading
+from smajax.core.names_of_runs import is_of_run, of_run, parameter_of
 from smajax.model.channels import INPUT_UNITS
 from smajax.report.identifiability_words import remark_text
 
@@ -28,6 +29,12 @@ def findings_parameters(findings: Findings) -> str:
         fitted = [one for which in (before, after) for one in _fitted(which.get(name))]
         any_ = after.get(name) or before[name]
         rows.append([name, any_.unit, *fitted, any_.lower, any_.upper, any_.start])
+    first = {parameter_of(one.name): one for one in reversed(findings.after) if is_of_run(one.name)}
+    for run in findings.runs:  # held-out ones, to which their own values alone were fitted
+        for parameter, value in run.own_after.items():
+            of = first[parameter]
+            own = [run.own_before.get(parameter), None, value, None]
+            rows.append([of_run(parameter, run.name), of.unit, *own, of.lower, of.upper, of.start])
     head = ["before", "standard error before", "after", "standard error after", "lower", "upper", "start"]
     return csv_text(["parameter", "unit", *head], rows)
 

@@ -11,7 +11,7 @@ from markupsafe import Markup
 
 from smajax.attribution.findings import Findings, ParameterFinding, Role, coverage, pooled_rmse
 from smajax.core.display_units import chance, correlation, digits, display, label, p_value, with_error
-from smajax.core.names_of_runs import is_of_run, parameter_of
+from smajax.core.names_of_runs import is_of_run, of_run, parameter_of
 from smajax.core.wording import and_listed, per_cent, verdict_text
 from smajax.fit.uncertainty import RemarkKind
 from smajax.report import pictures, run_plots
@@ -81,6 +81,29 @@ def _parameter_rows(findings: Findings) -> list[dict[str, Any]]:
                 "entangled": name in correlated or any_.remark.kind is RemarkKind.COMBINATION,
             }
         )
+    return _with_held_out_runs(findings, rows)
+
+
+def _with_held_out_runs(findings: Findings, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The rows, and below a parameter's values of fit runs those of the held-out runs."""
+    known = {parameter_of(one.name): one for one in findings.after if is_of_run(one.name)}
+    for parameter, any_ in known.items():
+        unit = display(any_.unit, parameter).unit
+        last = max(number for number, row in enumerate(rows) if parameter_of(row["name"]) == parameter)
+        rows[last + 1 : last + 1] = [
+            {
+                "name": of_run(parameter, run.name),
+                "unit": unit,
+                "start": shown(any_.start, any_.unit, parameter),
+                "before": shown(run.own_before.get(parameter), any_.unit, parameter),
+                "after": shown(run.own_after[parameter], any_.unit, parameter),
+                "bounds": f"{shown(any_.lower, any_.unit, parameter).text} … {shown(any_.upper, any_.unit, parameter).text}",
+                "remark": "fitted to the held-out run alone, all else held",
+                "entangled": False,
+            }
+            for run in findings.runs
+            if parameter in run.own_after
+        ]
     return rows
 
 

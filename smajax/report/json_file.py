@@ -78,6 +78,7 @@ def _run(run: RunFinding) -> dict[str, Any]:
             if run.others
             else {}
         ),
+        **({"values_of_run_before": run.own_before, "values_of_run_after": run.own_after} if run.own_after else {}),
     }
 
 

@@ -24,7 +24,7 @@ from smajax.data.model_catalogue import CATALOGUE
 from smajax.fit.experiment_problem import declared_problem
 from smajax.fit.identify import identify
 from smajax.fit.outputs_of_runs import misfits, sums_of_squares
-from smajax.report.csv_files import findings_runs
+from smajax.report.csv_files import findings_parameters, findings_runs
 from smajax.report.html import findings_to_html
 from smajax.report.json_file import findings_to_json
 from smajax.report.narrative import narrate
@@ -156,6 +156,24 @@ def test_page_record_and_table_have_every_output(found: Findings) -> None:
     assert "resistance: measured − model" in page
     assert found.extended_model is not None
     assert [output.name for output in found.extended_model.outputs] == ["strain", "resistance"]
+
+
+@pytest.mark.usefixtures("blank_pictures")
+def test_the_own_value_of_a_held_out_run_stands_beside_those_of_the_fit_runs(found: Findings) -> None:
+    held_out = found.runs[-1]
+    assert all(not run.own_after for run in found.runs if run.role == "fit")
+    value = held_out.own_after["austenite_start"]
+    fitted = next(one for one in found.after if one.name == "austenite_start[low]")
+    assert fitted.standard_error is not None
+    assert value == pytest.approx(COUPON.wire.austenite_start + APART[-1], abs=4.0 * fitted.standard_error)
+    name = f"austenite_start[{held_out.name}]"
+    page = findings_to_html(found)
+    low, high, other = (page.index(f"<td>austenite start[{run}]</td>") for run in ("low", "high", held_out.name))
+    assert low < high < other
+    assert "fitted to the held-out run alone, all else held" in page[other : page.index("</tr>", other)]
+    assert findings_to_json(found)["runs"][-1]["values_of_run_after"] == held_out.own_after
+    (row,) = [line.split(",") for line in findings_parameters(found).splitlines() if line.startswith(name)]
+    assert float(row[4]) == pytest.approx(value)
 
 
 def test_the_model_has_the_mean_of_the_runs_own_values(found: Findings) -> None:
