@@ -393,7 +393,7 @@ def _provenance(experiment: Experiment, cache: ResultCache, command: str, seed: 
         "command": command,
         "seed": str(seed),
         "step": f"{experiment.step} s",
-        "seconds": f"{seconds:.0f}",
+        **cache.time_taken(seconds),
         "batches of fits taken from an earlier, interrupted run": str(cache.reused),
         "sha256 of the experiment file": hashlib.sha256(experiment.path.read_bytes()).hexdigest(),
         **{f"sha256 of {run.name}": run.sha256 for run in experiment.runs},

@@ -66,5 +66,10 @@ class ResultCache:
         self._saved = clock.monotonic()
         self._own.add(key)
 
+    def time_taken(self, seconds: float) -> dict[str, str]:
+        """For the provenance of a result: the `seconds` of this program, and that there was an earlier one whose results it took."""
+        resumed = {"seconds are counted": "since the resume: the time of the earlier run is not in them"}
+        return {"seconds": f"{seconds:.0f}", **(resumed if self.reused else {})}
+
     def _path(self, key: str) -> Path | None:
         return None if self.folder is None else self.folder / f"{key}.npz"

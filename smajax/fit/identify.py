@@ -225,6 +225,6 @@ def _provenance(command: str, seed: int, starts: int, seconds: float, cache: Res
         "command": command,
         "seed": str(seed),
         "points screened for starts": str(starts),
-        "seconds": f"{seconds:.0f}",
+        **cache.time_taken(seconds),
         **({"stages read from the cache": str(cache.reused)} if cache.reused else {}),
     }

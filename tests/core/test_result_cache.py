@@ -21,3 +21,8 @@ def test_what_this_run_saved_is_not_of_an_earlier_one(tmp_path: Path) -> None:
     assert found is not None
     np.testing.assert_array_equal(found["values"], np.arange(3.0))
     assert later.reused == 1
+    assert first.time_taken(12.4) == {"seconds": "12"}
+    assert later.time_taken(12.4) == {
+        "seconds": "12",
+        "seconds are counted": "since the resume: the time of the earlier run is not in them",
+    }
