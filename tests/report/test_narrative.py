@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-import numpy as np
 import pytest
 
 from smajax.attribution.findings import (
@@ -24,13 +23,11 @@ from smajax.attribution.findings import (
     Rejected,
     Round,
     StepDependent,
-    UnknownTerm,
     UnknownTermLikelier,
     Verdict,
     pooled_rmse,
 )
 from smajax.attribution.record_error import OutlierRun
-from smajax.attribution.unknown.terms import UNKNOWN
 from smajax.core.progress import Event, Message, Result, Stage, WarningMessage
 from smajax.data.model_file.of_presets import model_of_presets
 from smajax.fit.identifiability import Checks, Identifiability
@@ -239,7 +236,7 @@ def test_confounders_are_named_by_their_weight() -> None:
     assert not any("radiation" in one for one in narrate(findings(0.01)).cannot_know)
 
 
-def _nothing_added() -> Findings:
+def nothing_added() -> Findings:
     findings = made_findings()
     effects = tuple(dataclasses.replace(effect, added=False) for effect in findings.effects)
     residual = made_residual(1.1e-3, False)
@@ -258,7 +255,7 @@ def _nothing_added() -> Findings:
     ],
 )
 def test_a_verdict_without_a_named_effect_gives_the_reason(changed: dict[str, Any], said: str) -> None:
-    assert said in narrate(dataclasses.replace(_nothing_added(), **changed)).summary[0]
+    assert said in narrate(dataclasses.replace(nothing_added(), **changed)).summary[0]
 
 
 def test_an_outlier_run_beside_an_added_effect_is_reported() -> None:
@@ -326,69 +323,6 @@ def test_the_checks_before_a_fit_are_messages_and_a_prior_without_use_is_a_warni
         "check: The file does not give c: held at the values of the presets, or at the base that [priors.presets] has. `--presets fitted` fits them "
         "too, within what data sheets leave open, as close-loop does.",
     ]
-
-
-def _with_terms(
-    named: bool,
-    *others: str,
-    held_out: tuple[float, float] | None = None,
-    log_odds: float = 40.0,
-    left_out: float | None = 1.0,
-) -> tuple[str, ...]:
-    empty = np.zeros(0)
-
-    def term(name: str, first: bool) -> UnknownTerm:
-        kind = UNKNOWN[name]
-        return UnknownTerm(
-            name=name,
-            title=kind.candidate.title,
-            equation=kind.candidate.equation,
-            symbol=kind.symbol,
-            state=kind.state,
-            state_unit=kind.state_unit,
-            unit=kind.unit,
-            named=named and first,
-            indistinguishable=others if first else (),
-            log_odds=log_odds if first else -9.0,
-            score_gain=0.5,
-            left_out_before=2.0,
-            left_out_after=left_out,
-            held_out_before=held_out[0] if held_out and first else None,
-            held_out_after=held_out[1] if held_out and first else None,
-            at=empty,
-            values=empty,
-            error=empty,
-            error_held=empty,
-            cells=empty,
-            samples=empty,
-            formulas=(),
-        )
-
-    names = ("unknown_loss_of_temperature", "unknown_heat_of_fraction", "unknown_reading_of_time")
-    terms = tuple(term(name, k == 0) for k, name in enumerate(names))
-    return narrate(dataclasses.replace(_nothing_added(), unknown=terms)).summary
-
-
-def test_an_equation_is_named_only_if_no_other_explains_as_much() -> None:
-    assert "it is in the heat equation" in _with_terms(True)[1]
-    assert "it is in the heat equation" in _with_terms(True, "unknown_heat_of_fraction")[1]
-    assert "or a stored heat" in _with_terms(True, "unknown_heat_of_fraction")[1]
-    undecided = _with_terms(True, "unknown_reading_of_time")[1]
-    assert "do not determine whether it is in the heat equation or the sensor equation" in undecided
-    no_better = _with_terms(False, left_out=2.1)[1]
-    assert "is likeliest, but it predicts runs left out no better: likelier than none by 40.0" in no_better
-    little = _with_terms(False, left_out=1.8)[1]
-    assert (
-        "is likeliest, but it explains less than half of what is missing in runs left out: likelier than none" in little
-    )
-    of_one_run = _with_terms(False, left_out=None)[1]
-    assert "but one run, of which none can be left out, confirms no function: likelier than none by" in of_one_run
-    none = _with_terms(False, log_odds=-2.0)[1]
-    assert "Nor do these runs determine in which equation" in none
-    assert "none is likelier than no function at all" in none
-    assert "less likely than none by 2.0 in log odds" in none
-    assert "on those held out" in _with_terms(True, held_out=(2.0, 1.0))[1]
-    assert "is not validated on the held-out runs" in _with_terms(False, held_out=(1.0, 2.0))[1]
 
 
 def test_effects_that_the_file_keeps_from_being_candidates_are_counted() -> None:

@@ -25,6 +25,7 @@ from smajax.attribution.leave_one_run_out import predicting
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.paired_errors import compared, pooled_rms
 from smajax.attribution.score_test import Score, ranked
+from smajax.attribution.unknown.explained_share import EXPLAINED
 from smajax.attribution.unknown.ranges import Sought, sought
 from smajax.attribution.unknown.spline import design
 from smajax.attribution.unknown.terms import UNKNOWN
@@ -45,7 +46,6 @@ INDISTINGUISHABLE = 3.0  # in log odds: twenty to one
 # Of the likeliest's log odds over no term: seven splines leave about a hundredth of a function, and in which equation they leave
 # less of it says nothing.
 APPROXIMATE = 0.01
-EXPLAINED = 0.5  # of what is missing in runs left out: a function that explains less of it is not named, for the rest may be elsewhere
 PASSES = 2  # the error of a sample is first that of the model without a term, then that of the best with one
 MUCH = 7e4  # samples times directions of the derivative, of one fit
 REACH = 10.0  # in log odds behind the likeliest, within which a term is fitted again with the smaller error
@@ -216,7 +216,7 @@ def _less(with_it: float | None, without: float) -> bool:
 
 
 def _explains(with_it: float, without: float, noise: float) -> bool:
-    """Whether a function takes away `EXPLAINED` of the squares that the error on runs left out has beyond the noise; root mean squares, SI."""
+    """Whether a function takes away `EXPLAINED` of the squares that the error on runs left out has beyond the noise (`explained_share`); root mean squares, SI."""
     return _less(with_it, without) and with_it**2 - noise**2 <= (1.0 - EXPLAINED) * (without**2 - noise**2)
 
 
