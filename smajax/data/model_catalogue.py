@@ -117,6 +117,7 @@ CATALOGUE = Catalogue(
     describe=describe,
     coefficients=coefficients,
     odds={str(name): odds for name, odds in PRIOR_ODDS.items()},
+    groups={name: group for name, effect in LIBRARY.items() if (group := effect.candidate.exclusive_group)},
 )
 
 

@@ -85,7 +85,8 @@ class Catalogue:
     """Names that an experiment file may use, and the description of a combination of them.
 
     describe(wire, load, drive, law) raises ValueError when the three do not go together; law "" is the wire's own.
-    coefficients(effect): those of one effect by their own names. odds: prior odds by class.
+    coefficients(effect): those of one effect by their own names. odds: prior odds by class. groups: what effects describe that exclude
+    each other, by their names.
     """
 
     wires: Collection[str]
@@ -96,3 +97,4 @@ class Catalogue:
     describe: Callable[[str, str, str, str], ModelDescription]
     coefficients: Callable[[str], Mapping[str, CoefficientInfo]] = lambda effect: {}
     odds: Mapping[str, float] = field(default_factory=dict)
+    groups: Mapping[str, str] = field(default_factory=dict)

@@ -16,6 +16,7 @@ from smajax.data.experiment.catalogue import WIRE_SIZES, Catalogue, ModelDescrip
 from smajax.data.experiment.column_overrides import own_columns
 from smajax.data.experiment.data_folder import data_folder
 from smajax.data.experiment.declared_priors import declared_priors
+from smajax.data.experiment.effect_names import check_effects, useless
 from smajax.data.experiment.errors import ExperimentError, at_key, check_name
 from smajax.data.experiment.from_model_file import with_model_file
 from smajax.data.experiment.headings import heading_warnings
@@ -238,35 +239,6 @@ def _untold(file: ExperimentFile, free: Sequence[Unknown]) -> list[str]:
     ]
 
 
-def _check_effects(path: Path, file: ExperimentFile, catalogue: Catalogue, kept: FromModelFile | None) -> None:
-    """Names of effects, and lists of them that contradict each other or the model."""
-    only, excluded = file.effects.only or [], file.effects.exclude
-    for key, effects in (("effects.only", only), ("effects.exclude", excluded)):
-        for effect in effects:
-            check_name(path, key, "effect", effect, catalogue.effects)
-    declared = {name: f"{name}, in its model file" for name in (kept.effects if kept else ())}
-    declared |= {name.split(".", 1)[0]: name for name in (*file.model.parameters, *file.unknown) if "." in name}
-    for effect in excluded:
-        if effect in only:
-            raise ExperimentError(
-                path, "effects.exclude", f"{effect!r} is in effects.only too; remove it from one of them"
-            )
-        if effect in declared:
-            raise ExperimentError(
-                path,
-                "effects.exclude",
-                f"{effect!r} is part of the model, since the file names {declared[effect]!r}; remove one of the two",
-            )
-
-
-def _useless(file: ExperimentFile, model: ModelDescription) -> list[str]:
-    """Effects that are asked for and that this model cannot show."""
-    none = [name for name in file.effects.only or [] if model.effects is not None and name not in model.effects]
-    return [
-        f"effects.only names {name!r}, which changes nothing of this load and drive; it is not tried" for name in none
-    ]
-
-
 def _check_order(
     path: Path, file: ExperimentFile, model: ModelDescription, values: Mapping[str, float], place: str = ""
 ) -> None:
@@ -309,7 +281,7 @@ def experiment_of(path: Path, file: ExperimentFile, catalogue: Catalogue) -> Exp
     every = unknowns(path, file, model.parameters)
     fixed |= {unknown.name: unknown.start for unknown in every if file.unknown[unknown.name].fixed}
     free = tuple(unknown for unknown in every if unknown.name not in fixed) + run_starts(path, file, model)
-    _check_effects(path, file, catalogue, kept)
+    check_effects(path, file, catalogue, kept)
     priors, not_tried = declared_priors(path, file, catalogue, model, kept)
     values = (dict(kept.values) if kept else {}) | fixed | {unknown.name: unknown.start for unknown in free}
     _check_order(path, file, model, values)
@@ -340,7 +312,7 @@ def experiment_of(path: Path, file: ExperimentFile, catalogue: Catalogue) -> Exp
     scale = None if model.scale is None else model.scale(values)
     warnings += magnitude_warnings(runs, scale, heats, reading.step, zeroed)
     warnings += ambient_warnings(runs, file.channels.get(AMBIENT), scale, heats, reading.step)
-    warnings += _useless(file, model) + not_tried + _untold(file, free)
+    warnings += useless(file, model) + not_tried + _untold(file, free)
     warnings += [] if kept else preset_warnings(file.model.wire, free, model.parameters)
     warnings += role_warnings(file.runs)
     warnings += motion_warnings([read.run for read in runs], [output for output, _ in outputs])
