@@ -12,6 +12,7 @@ from smajax.model.drive import supply
 from smajax.model.drive.base import AbstractDrive
 from smajax.model.effects.base import AbstractEffect
 from smajax.model.effects.grouping import Terms, check_effects, grouped
+from smajax.model.effects.history_errors import history_entries_named
 from smajax.model.load import force
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.load.coupon import AbstractCoupon, StrainCoupon
@@ -95,6 +96,7 @@ def _elastic_strain(system: System, at: WireState) -> Scalar:
     return elastic + effect_strain(system.wire, terms, at) - effect_strain(system.wire, terms, unloaded)
 
 
+@history_entries_named()
 def initial_state(system: System, inputs: Inputs) -> State:
     """At rest with the first inputs: a moving load in equilibrium at ambient temperature, a coupon as prescribed."""
     terms = system.terms

@@ -28,6 +28,7 @@ from jax import lax
 
 from smajax.core.checkpointed_scan import recomputed, solved
 from smajax.core.traced_once import traced_once
+from smajax.model.effects.history_errors import history_entries_named
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.load.coupon import Coupon, StrainCoupon
 from smajax.model.load.friction import in_use, rubbing
@@ -245,6 +246,7 @@ def _strain_coupon_step(system: System, state: State, inputs: Inputs, dt: Scalar
     return dataclasses.replace(state, time=state.time + dt, wire=new, motion=Motion(-strain, still))
 
 
+@history_entries_named()
 def step(system: System, state: State, inputs: Inputs, dt: Scalar | float, once: bool = False) -> State:
     """Advance one system by `dt` seconds with `inputs` (SI, scalars) held.
 
@@ -263,6 +265,7 @@ def step(system: System, state: State, inputs: Inputs, dt: Scalar | float, once:
     return _read(system, state, new, _sensed(system, state, new), dt)
 
 
+@history_entries_named()
 def step_and_error(
     system: System, state: State, inputs: Inputs, dt: Scalar, once: bool = False
 ) -> tuple[State, tuple[Scalar, Scalar, Scalar]]:

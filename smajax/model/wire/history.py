@@ -47,12 +47,12 @@ def _check_entries(terms: Sequence[HistoryTerm], at: WireState) -> None:
         try:
             after = jax.eval_shape(term.history_after, at, at)
         except (LookupError, ValueError) as missing:
-            raise ValueError(f"effect `{name}`: {_missing(str(missing.args[0]), at.history)}") from None
+            raise ValueError(f"effect `{name}`: {missing_entry(str(missing.args[0]), at.history)}") from None
         if strange := sorted(after.keys() - at.history.keys()):
-            raise ValueError(f"effect `{name}`: {_missing(strange[0], at.history)}")
+            raise ValueError(f"effect `{name}`: {missing_entry(strange[0], at.history)}")
 
 
-def _missing(entry: str, history: Mapping[str, Scalar]) -> str:
+def missing_entry(entry: str, history: Mapping[str, Scalar]) -> str:
     """What to do about an entry that is not there; a message that already says so as it is."""
     if " " in entry:
         return entry
@@ -98,7 +98,7 @@ def following(old: WireState, name: str, before: Scalar, now: Scalar, time_const
     """
     for entry in (DURATION, name):
         if entry not in old.history:
-            raise ValueError(f"following {name!r}: {_missing(entry, old.history)}")
+            raise ValueError(f"following {name!r}: {missing_entry(entry, old.history)}")
     # A time constant of a femtosecond is none, and has a derivative that zero has not.
     steps = jnp.maximum(old.history[DURATION], 1e-12) / (time_constant + 1e-15)
     gone = forgotten(steps)
