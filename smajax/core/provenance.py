@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import platform
 import subprocess
 from collections.abc import Sequence
@@ -47,6 +48,20 @@ def git_state() -> str:
     return commit + ("+changes" if commit and asked("status", "--porcelain", "-uno") else "")
 
 
+@lru_cache(maxsize=8)
+def _git_state_in(folder: str) -> str:
+    """`git_state` of the working folder, asked once a process: git takes tens of milliseconds, more than many a batch."""
+    return git_state() if folder else ""
+
+
+def _working_folder() -> str:
+    """Empty where it was removed."""
+    try:
+        return os.getcwd()
+    except OSError:
+        return ""
+
+
 @lru_cache(maxsize=1)
 def versions() -> dict[str, str]:
     return {name: metadata.version(name) for name in PACKAGES} | {"python": platform.python_version()}
@@ -61,10 +76,10 @@ def digest(model: Any, more: Sequence[str | np.ndarray] = ()) -> str:
 
 
 def provenance(model: eqx.Module, **settings: object) -> dict[str, str]:
-    """Attributes of a result: text only, so that every format can hold them; no `git` outside of a repository."""
+    """Attributes of a result: text only, so that every format can hold them; no `git` outside of a repository, else as it was at the process's first result."""
     rows = {f"version of {name}": version for name, version in versions().items()}
     rows |= {name: str(value) for name, value in settings.items()}
-    commit = git_state()
+    commit = _git_state_in(_working_folder())
     rows |= {"git": commit} if commit else {}
     return rows | {"parameters (SI)": json.dumps(parameter_values(model))}
 

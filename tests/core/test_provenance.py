@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from smajax.core.provenance import git_state
+from smajax.core.provenance import git_state, provenance
+from smajax.model.presets import build
 
 
 @pytest.mark.skipif(shutil.which("git") is None, reason="no git here")
@@ -39,3 +40,21 @@ def test_the_state_of_a_repository_is_read_and_its_index_left_alone(
     assert (tmp_path / ".git" / "index").read_bytes() == before
     (tmp_path / "log.csv").write_text("2")
     assert git_state() == f"{commit}+changes"
+
+
+def test_git_is_asked_once_for_all_results_of_a_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[str] = []
+
+    def state() -> str:
+        asked.append(str(Path.cwd()))
+        return "a commit"
+
+    monkeypatch.setattr("smajax.core.provenance.git_state", state)
+    model = build("flexinol_table_3_2", "dead_weight", "voltage")
+    monkeypatch.chdir(tmp_path)
+    assert [provenance(model)["git"] for _ in range(3)] == ["a commit"] * 3
+    assert asked == [str(tmp_path)]
+    (tmp_path / "other").mkdir()
+    monkeypatch.chdir(tmp_path / "other")  # of another repository, as it may be
+    provenance(model)
+    assert len(asked) == 2
