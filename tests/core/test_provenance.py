@@ -53,7 +53,7 @@ def test_git_is_asked_once_for_all_results_of_a_process(tmp_path: Path, monkeypa
     model = build("flexinol_table_3_2", "dead_weight", "voltage")
     monkeypatch.chdir(tmp_path)
     assert [provenance(model)["git"] for _ in range(3)] == ["a commit"] * 3
-    assert asked == [str(tmp_path)]
+    assert len(asked) == 1
     (tmp_path / "other").mkdir()
     monkeypatch.chdir(tmp_path / "other")  # of another repository, as it may be
     provenance(model)
