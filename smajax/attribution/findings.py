@@ -27,6 +27,7 @@ from smajax.fit.identifiability import Checks
 from smajax.fit.integration import IntegrationError
 from smajax.fit.residual_diagnostics import ResidualDiagnostics as ResidualDiagnostics
 from smajax.fit.uncertainty import Remark
+from smajax.model.effects.library import LIBRARY
 
 
 class Verdict(StrEnum):
@@ -250,8 +251,8 @@ class UnknownTerm:
     indistinguishable: tuple[str, ...]  # terms that the runs do not distinguish from the named one
     log_odds: float  # of the model with it over the one without
     score_gain: float
-    left_out_before: float
-    left_out_after: float | None  # None of a term that is less likely than others by far
+    left_out_before: float  # NaN where no term is likelier than none
+    left_out_after: float | None  # None of a term that is less likely than none, or than others by far
     held_out_before: float | None  # on the held-out runs, where the term was asked for that
     held_out_after: float | None
     at: np.ndarray  # states, (points,)
@@ -333,9 +334,12 @@ class Findings:
 
     @property
     def coefficients_at_bounds(self) -> tuple[ParameterFinding, ...]:
-        """Coefficients of added effects that end at a bound of their range, but for those at a zero where the effect is off."""
-        added = tuple(f"{effect.name}." for effect in self.added)
-        return tuple(one for one in self.after if one.limited and one.name.startswith(added) and not one.at_zero)
+        """Sizes of added effects that end at a bound of their range, but for those at a zero where the effect is off.
+
+        A time or a width of an effect at its bound says less: that these runs do not determine it.
+        """
+        sizes = {f"{effect.name}.{name}" for effect in self.added for name in LIBRARY[effect.name].candidate.switches}
+        return tuple(one for one in self.after if one.limited and one.name in sizes and not one.at_zero)
 
     @property
     def fit_runs(self) -> int:

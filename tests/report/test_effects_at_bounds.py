@@ -41,6 +41,21 @@ def test_an_effect_that_ends_at_a_bound_is_not_shown_as_a_trusted_answer() -> No
     assert "latent_heat.enthalpy ends at zero, where the effect is off" in " ".join(narrate(findings).summary)
 
 
+def test_a_width_at_its_bound_is_a_caution_and_not_a_doubt_about_the_effect() -> None:
+    """It says that these runs do not determine it; the effect's size does not end there."""
+    findings = made_findings()
+    spring = dataclasses.replace(findings.added[0], name="nonlinear_spring")
+    width = dataclasses.replace(
+        findings.after[-1], name="nonlinear_spring.displacement", value=1e5, remark=Remark(RemarkKind.UPPER_BOUND)
+    )
+    findings = dataclasses.replace(findings, effects=(spring,), after=(width,))
+    assert findings.coefficients_at_bounds == ()
+    said = " ".join(narrate(findings).summary)
+    assert "nonlinear_spring.displacement ends at its upper bound" in said
+    assert "the runs do not determine it" in said
+    assert "may lack" not in said
+
+
 def test_the_terminal_says_beside_the_verdict_that_an_effect_ends_at_a_bound(capsys: Any, tmp_path: Path) -> None:
     at_its_bound = dataclasses.replace(made_findings().after[-1], value=1e5, remark=Remark(RemarkKind.UPPER_BOUND))
     print_findings(dataclasses.replace(made_findings(), after=(at_its_bound,)), tmp_path / "report.html")

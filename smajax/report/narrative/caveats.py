@@ -122,6 +122,11 @@ def of_bounds(findings: Findings) -> Iterator[str]:
     off = [one.name for one in findings.after if one.at_zero and one.name.startswith(added)]
     if off:
         yield f"Mind: {and_listed(off)} {'ends' if len(off) == 1 else 'end'} at zero, where the effect is off: the runs ask for none of it."
+    sizes = findings.coefficients_at_bounds
+    shapes = [one for one in findings.after if one.limited and one.name.startswith(added) and not one.at_zero]
+    if ends := [_ends(one) for one in shapes if one not in sizes]:
+        them = "it" if len(ends) == 1 else "them"
+        yield f"Mind: {and_listed(ends)}: the runs do not determine {them}, or ask for more than the effect allows."
     # A value of a preset has no bounds in the file (`of_priors_left`).
     own = [one for one in findings.after if one.limited and not one.name.startswith(added)]
     own = [one for one in own if not far_text(findings, one)]
