@@ -27,7 +27,8 @@ def acting_inputs(system: System, series: Mapping[str, Series], dt: Scalar | flo
     """`series` (each of shape (n,), `dt` seconds apart) with the channels `recorded_apart` as late as the effects say.
 
     A lag of a part of a step gives two commands that hold one after the other (`with_switch`), and of what was measured at the
-    samples (a coupon's temperature) the straight line between two. Beyond its ends a series is as at them.
+    samples (a coupon's temperature) two straight lines that meet at a sample: where a temperature turns it is reached, and not cut off.
+    Beyond its ends a series is as at them.
     """
     late, acting = system.terms.input_lag, dict(series)
     channels = sorted(recorded_apart(system) & set(series))
@@ -49,5 +50,6 @@ def acting_inputs(system: System, series: Mapping[str, Series], dt: Scalar | flo
     # One sample after the other: each run looks up one number at a time, at an index of its own.
     _, (share, older, newer) = lax.scan(shifted, None, jnp.arange(last + 1))
     if isinstance(system.load, AbstractCoupon):
-        return acting | {name: share * older[name] + (1.0 - share) * newer[name] for name in channels}
+        ends = {name: share * older[name] + (1.0 - share) * newer[name] for name in channels}
+        return acting | with_switch(older, ends, share)
     return acting | with_switch(older, newer, share)

@@ -6,6 +6,7 @@ Each is an `advance` of `integrate`, for inputs by channel (SI; held, or of a co
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from typing import Any
 
 import equinox as eqx
@@ -113,7 +114,10 @@ class ErrorControlledSteps(eqx.Module):
 
 
 class CouponSubsteps(eqx.Module):
-    """So many equal steps in `dt` (s), of a coupon whose inputs follow straight lines from sample to sample."""
+    """So many equal steps in `dt` (s), of a coupon whose inputs follow straight lines from sample to sample.
+
+    Twice as many where a temperature that acts late turns within (`acting_inputs`): as many to there, and as many from there on.
+    """
 
     system: System
     dt: Scalar | float
@@ -121,18 +125,34 @@ class CouponSubsteps(eqx.Module):
 
     def start(self, state: State, inputs: Inputs) -> Carry:
         """What a run from `state` begins with; `inputs` are those at its start."""
-        return Carry(state, {name: jnp.asarray(value, dtype=float) for name, value in inputs.items()})
+        _, _, now = switched(inputs) or (None, None, inputs)
+        return Carry(state, {name: jnp.asarray(value, dtype=float) for name, value in now.items()})
 
     def __call__(self, carry: Carry, inputs: Inputs) -> Carry:
         before: Inputs = carry.memory
-
-        def advance(at: Carry, share: Scalar) -> Carry:
-            now = {name: before[name] + share * (inputs[name] - before[name]) for name in inputs}
-            return Carry(step(self.system, at.state, now, self.dt / self.substeps))
-
+        share, turn, end = switched(inputs) or (None, None, inputs)
+        corners, parts = [before, end], [jnp.ones(())]
+        if share is not None and turn is not None:
+            # What acts late is given where it turns; the others are on their way.
+            on_the_way = {name: before[name] + share * (end[name] - before[name]) for name in end}
+            there = {name: turn[name] if turn[name] is not end[name] else on_the_way[name] for name in end}
+            # No part without length: a lag of the sensor divides by it.
+            first = jnp.clip(share, SHORTEST_PART, 1.0 - SHORTEST_PART)
+            corners, parts = [before, there, end], [first, 1.0 - first]
         shares = jnp.arange(1, self.substeps + 1) / self.substeps
-        end = integrate(advance, Carry(carry.state), shares, Schedule(self.substeps)).end
-        return Carry(end.state, dict(inputs))
+        path = [
+            {name: left[name] + shares * (right[name] - left[name]) for name in end}
+            for left, right in itertools.pairwise(corners)
+        ]
+        lengths = jnp.repeat(jnp.stack(parts), self.substeps) * (self.dt / self.substeps)
+        values = {name: jnp.concatenate([one[name] for one in path]) for name in end}
+
+        def advance(at: Carry, now: tuple[Scalar, Inputs]) -> Carry:
+            length, acting = now
+            return Carry(step(self.system, at.state, acting, length))
+
+        march = integrate(advance, Carry(carry.state), (lengths, values), Schedule(len(parts) * self.substeps))
+        return Carry(march.end.state, dict(end))
 
 
 class SwitchedSteps(eqx.Module):
@@ -202,6 +222,6 @@ def stepper_of(system: System, dt: Scalar | float, integration: Integration = ON
                 system, jnp.asarray(dt, dtype=float), integration.tolerance, once, integration.most_tries
             )
         return SwitchedSteps(whole) if system.terms.input_lag and system.drive.inputs_required else whole
-    return (
-        FixedStep(system, dt, once) if integration.substeps == 1 else CouponSubsteps(system, dt, integration.substeps)
-    )
+    if integration.substeps > 1 or system.terms.input_lag:
+        return CouponSubsteps(system, dt, integration.substeps)
+    return FixedStep(system, dt, once)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from smajax.core.parameters import parameter_values
+from smajax.core.parameters import parameter_values, set_parameters
 from smajax.data.experiment.record import Run
 from smajax.fit.integration import with_integration
 from smajax.fit.outputs_of_runs import predicted_and_derivatives
@@ -16,6 +17,7 @@ from smajax.model.extended import extended
 from smajax.model.presets import build
 from smajax.simulation.batch.axes import zipped
 from smajax.simulation.batch.run_batch import run_batch
+from smajax.simulation.simulate import simulate
 from smajax.simulation.steppers import Integration
 from studies import integration as study
 from studies.reference.wire_parameters import DeadWeightParameters
@@ -78,3 +80,43 @@ def test_a_constant_command_has_no_delay() -> None:
         tolerance=None,
     )
     np.testing.assert_allclose(late["position"], plain["position"], rtol=0.0, atol=1e-12)
+
+
+def _oven(times: np.ndarray) -> np.ndarray:
+    """Up, down past the middle of the transformation, and up again: it turns between samples of 1 s that are 0.24 s late."""
+    return np.interp(times, [0.0, 60.0, 95.0, 130.0], [30.0, 90.0, 55.0, 90.0])
+
+
+def _under_stress(times: np.ndarray) -> dict[str, jnp.ndarray]:
+    return {"temperature": jnp.asarray(_oven(times)), "stress": jnp.full(times.size, 1e8)}
+
+
+@pytest.mark.parametrize("substeps", [1, 3])
+@pytest.mark.parametrize("delay", [0.24, -0.3, 1.6])
+def test_a_coupon_whose_temperature_is_late_reaches_where_it_turns(delay: float, substeps: int) -> None:
+    """Against the temperature that acts, recorded a hundred times as often: at the samples alone the turn is cut off, by a tenth of a degree."""
+    fine = np.arange(13001) / 100.0
+    late = extended(build("flexinol_isobaric", "coupon", "none"), ("input_delay",), {"input_delay.delay": delay})
+    acting = np.clip(fine - delay, 0.0, 130.0)
+    exact = simulate(build("flexinol_isobaric", "coupon", "none"), _under_stress(acting), dt=0.01).strain[::100]
+    found = simulate(late, _under_stress(np.arange(131.0)), dt=1.0, integration=Integration(substeps=substeps)).strain
+    assert np.ptp(np.asarray(exact)) > 0.02
+    # The temperature begins to move between two samples in both, which the clip at the start shows.
+    np.testing.assert_allclose(found[2:], exact[2:], rtol=0.0, atol=2e-7)
+
+
+def test_a_coupon_without_a_delay_runs_as_without_the_effect_and_has_its_derivative() -> None:
+    plain = build("flexinol_isobaric", "coupon", "none")
+    inputs = _under_stress(np.arange(131.0))
+    strains = [simulate(one, inputs, dt=1.0).strain for one in (plain, extended(plain, ("input_delay",)))]
+    np.testing.assert_allclose(strains[1], strains[0], rtol=0.0, atol=1e-12)
+
+    def at(delay: jnp.ndarray) -> jnp.ndarray:
+        system = extended(plain, ("input_delay", "creep"), {"creep.martensite": 1e-10})
+        system = set_parameters(system, {"input_delay.delay": delay})
+        return jnp.asarray(simulate(system, inputs, dt=1.0).strain)
+
+    slope = jax.jacfwd(at)(jnp.asarray(0.2))
+    difference = (at(jnp.asarray(0.2 + 1e-5)) - at(jnp.asarray(0.2 - 1e-5))) / 2e-5
+    assert np.abs(slope).max() > 1e-5
+    np.testing.assert_allclose(slope, difference, rtol=0.0, atol=1e-3 * np.abs(slope).max())
