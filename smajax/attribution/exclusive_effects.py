@@ -19,6 +19,13 @@ def exclude_each_other(effects: Collection[str]) -> bool:
     return len(set(groups)) < len(groups)
 
 
+def replaceable(one: str, other: str) -> bool:
+    """Whether either may stand in the place of the other, whatever a linear model says: both describe the same, or look much the same in a log."""
+    first, second = LIBRARY[one].candidate, LIBRARY[other].candidate
+    alike = bool(first.similar_group) and first.similar_group == second.similar_group
+    return one != other and (alike or exclude_each_other((one, other)))
+
+
 def in_another_way(
     fitted: Iterable[FittedModel], present: FittedModel, known: Collection[tuple[str, ...]], error: float, odds: float
 ) -> FittedModel | None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from smajax.attribution import joint_search, traces
-from smajax.attribution.exclusive_effects import exclude_each_other, in_another_way
+from smajax.attribution.exclusive_effects import exclude_each_other, in_another_way, replaceable
 from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model
 from smajax.attribution.model_fits import Search
@@ -59,6 +59,25 @@ def test_every_other_of_the_group_is_tried_in_the_place_of_one_whatever_the_line
     sets = joint_search._neighbours(search, linear, beside, NOISE)
     assert sets
     assert not any(exclude_each_other([each.effect for each in one]) for one in sets)
+
+
+def test_what_looks_much_the_same_in_a_log_is_tried_in_its_place_and_does_not_exclude_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    assert replaceable("input_delay", "sensor_lag")
+    assert replaceable("smooth_transformation", "transformation_curve")
+    assert not replaceable("latent_heat", "sensor_lag")
+    assert not replaceable("latent_heat", "creep")  # neither is of a group
+    assert not exclude_each_other({"input_delay", "sensor_lag"})
+    among = ("latent_heat", "sensor_lag", "input_delay")
+    search = hot_weight({"sensor_lag.time_constant": 0.3}, among)
+    values = search.joint.problem.start_values()
+    values[search.joint.slots["sensor_lag.time_constant"]] = 0.3
+    present = fitted_model(search.joint, ("sensor_lag",), values, ("sensor_lag",))
+    linear = linear_model(search.joint, traces_at(search.joint, present, search.extent), NOISE**2, among)
+    monkeypatch.setattr(joint_search, "CERTAIN", -np.inf)  # the linear model offers none
+    near = {joint_search._effects(search, one) for one in joint_search._neighbours(search, linear, present, NOISE)}
+    assert near == {("input_delay",)}
 
 
 def test_traces_are_the_same_in_one_program_and_in_several(

@@ -73,6 +73,7 @@ def _entry(effect: type[AbstractEffect]) -> dict[str, Any]:
         "formula": candidate.formula,
         "meaning": candidate.sentence,
         "exclusive_group": candidate.exclusive_group,
+        "similar_group": candidate.similar_group,
         "prior": {"class": candidate.prior_class, "odds": PRIOR_ODDS[candidate.prior_class]},
         "parameters": entries,
     }
@@ -91,6 +92,10 @@ def _text(effect: type[AbstractEffect]) -> str:
     ]
     if candidate.exclusive_group:
         lines.append(f"  At most one effect of this group is added: {candidate.exclusive_group}.")
+    if candidate.similar_group:
+        lines.append(
+            f"  Effects of this group look much the same in a log, and each is tried in the place of another: {candidate.similar_group}."
+        )
     for name, entry in parameters(effect.base()).items():
         width = stated_width(effect, name.split(".", 1)[1])
         lines += [

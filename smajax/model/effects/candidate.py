@@ -27,6 +27,7 @@ PRIOR_ODDS: Mapping[PriorClass, float] = MappingProxyType({"material": 0.1, "ben
 
 # `Candidate.exclusive_group` of the effects that change how the transformation runs through its range.
 TRANSFORMATION_SHAPE = "shape of the transformation"
+DELAY = "delay"
 
 Scale = Literal["", "stroke", "increment", "run", "load", "1/run", "stroke/run"]
 SCALES: tuple[str, ...] = get_args(Scale)
@@ -118,6 +119,8 @@ class Candidate:
     stick_slip: bool = False
     # What it describes, where several effects describe the same in ways that exclude each other: no model of the search has two of one group.
     exclusive_group: str = ""
+    # What it looks like in a log, where several effects that do not exclude each other look much the same: in the place of one that was added each of the others is tried.
+    similar_group: str = ""
     # Whether its priors take part in the fit whose values are reported as well: they say how smooth a shape is, which the runs alone
     # do not determine.
     keeps_priors: bool = False

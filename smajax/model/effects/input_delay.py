@@ -7,7 +7,7 @@ from typing import ClassVar
 from smajax.core.parameters import parameter
 from smajax.model.drive.inputs import InputLagTerm
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Actuator, Candidate, Width
+from smajax.model.effects.candidate import DELAY, Actuator, Candidate, Width
 from smajax.model.load.coupon import AbstractCoupon
 from smajax.model.types import Scalar
 
@@ -33,6 +33,7 @@ class InputDelay(AbstractEffect, InputLagTerm):
         switches=("delay",),
         initial_guess={"delay": 0.03},
         needs_time=True,
+        similar_group=DELAY,
         applies=_applies,
         prior_class="event",
         widths={

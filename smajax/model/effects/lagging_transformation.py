@@ -8,7 +8,7 @@ import jax.numpy as jnp
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate, Width
+from smajax.model.effects.candidate import DELAY, Candidate, Width
 from smajax.model.types import Scalar, WireState
 from smajax.model.wire.history import DURATION, HistoryTerm, following
 from smajax.model.wire.kinetics import cooling_width, heating_width
@@ -39,6 +39,7 @@ class LaggingTransformation(AbstractEffect, HistoryTerm, RangeTerm):
         switches=("time_constant",),
         initial_guess={"time_constant": 0.1},
         needs_time=True,
+        similar_group=DELAY,
         prior_class="bench",
         widths={
             "time_constant": Width(

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate, Width
+from smajax.model.effects.candidate import DELAY, Candidate, Width
 from smajax.model.sensor_reading import SensorLagTerm
 from smajax.model.types import Scalar
 
@@ -25,6 +25,7 @@ class SensorLag(AbstractEffect, SensorLagTerm):
         switches=("time_constant",),
         initial_guess={"time_constant": 0.1},
         needs_time=True,
+        similar_group=DELAY,
         prior_class="bench",
         widths={
             "time_constant": Width(0.05, "filters of displacement sensors and amplifiers: 1 to 100 ms"),
