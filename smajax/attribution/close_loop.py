@@ -30,7 +30,13 @@ from smajax.attribution.held_out import Compared, compare, every_run, validated
 from smajax.attribution.input_of_run import corrected, record_error
 from smajax.attribution.job import Job, effects_excluded, job_of
 from smajax.attribution.joint_search import JointSearch
-from smajax.attribution.joint_stage import base_alone, likeliest_so_far, search_by_evidence, search_without
+from smajax.attribution.joint_stage import (
+    base_alone,
+    likeliest_so_far,
+    search_again,
+    search_by_evidence,
+    search_without,
+)
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.neutral_at_base import check_neutral
@@ -56,7 +62,6 @@ MOST_SEARCHES = 2  # the first, and again without what the held-out runs rejecte
 MOST_RECORD_ERRORS = 2  # of single runs that are corrected: with more of them nothing is left that says which is right
 EVERY, RARELY = 60.0, 8.0  # s before the first page of a search that goes on; times what the last took before the next
 CHECKING, WRITING = "checking what these runs determine", "standard errors and pictures"
-
 
 Interim = Callable[[Findings], object]  # gets what is known of an attribution that goes on
 
@@ -209,21 +214,16 @@ def _now_and_then(context: Context, interim: Interim) -> Callable[[JointSearch, 
     return after_round
 
 
-def searched(context: Context) -> Outcome:
-    """The base model and the one that the search ends with."""
-    return Outcome(*search_by_evidence(context.setting, context.base))
-
-
 def searched_finely(context: Context) -> tuple[Context, Outcome]:
-    """The search; where the model that it ends with asks for a finer integration, all of it again with that."""
-    outcome, setting = searched(context), context.setting
-    finer = finer_integration(setting, outcome.final.effects, outcome.final.values)
-    if finer is None:
+    """The search; where the model that it ends with asks for a finer integration, on from its likeliest models with that."""
+    setting = context.setting
+    outcome = Outcome(*search_by_evidence(setting, context.base))
+    if (finer := finer_integration(setting, outcome.final.effects, outcome.final.values)) is None:
         return context, outcome
-    # Models are compared as one integration gives them.
-    experiment, seed = context.job.experiment, context.seed
-    context = prepared(experiment, setting.cache, setting.progress, seed, setting.config, context.interim, finer)
-    return context, searched(context)
+    given = context.job.experiment, setting.cache, setting.progress, context.seed, setting.config
+    context = prepared(*given, context.interim, finer)
+    context.setting.rounds += setting.rounds
+    return context, Outcome(*search_again(context.setting, context.base, outcome.search))
 
 
 def wrong_record(context: Context, outcome: Outcome) -> RecordError | None:
@@ -261,7 +261,7 @@ def against_an_unknown_term(context: Context, outcome: Outcome) -> Outcome:
     setting, base, final = context.setting, outcome.base, outcome.final
     if not final.effects or (setting.is_noise(final) and len(final.effects) < setting.config.many_effects):
         return outcome
-    lacking = in_place_of(setting, base, final)
+    lacking = in_place_of(setting, base, final, outcome.search.lacking)
     if lacking is not None:
         return replace(outcome, final=base, lacking=lacking, superseded=final.effects)
     if not setting.predicts(final.left_out_rmse):

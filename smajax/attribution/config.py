@@ -60,7 +60,7 @@ class AttributionConfig:
 
     # Unknown terms
     many_effects: int = (
-        3  # from which one unknown function is asked for in their place, even where they leave only noise
+        2  # from which one unknown function is asked for in their place, even where they leave only noise
     )
     terms_refitted: int = 6  # about one an equation
     term_start_share: float = 0.5  # of the score test's estimate: where a refit starts

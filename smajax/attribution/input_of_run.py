@@ -21,9 +21,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.joint_parameters import JointParameters
-from smajax.attribution.joint_search import comparison_settings
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model, independent_error
 from smajax.attribution.model_fits import Model, Search
+from smajax.attribution.program_fits import comparison_settings
 from smajax.attribution.record_error import RecordError
 from smajax.core.names_of_runs import of_run
 from smajax.core.parameters import parameters

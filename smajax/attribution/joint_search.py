@@ -4,7 +4,7 @@ Each round takes one Jacobian by the coefficients of all candidates at the likel
 effects in the linear model about it (`subset_evidence`), and fits the few best sets that have not been fitted, all
 parameters together. A set counts by the evidence of its own fit (`laplace_evidence`), never by the linear model's. It
 ends where no fitted set is likelier than the present one, and none is by more than `SETTLED_ODDS` in which one of its effects
-is removed or replaced, or, while much is left, one of the likeliest others added.
+is removed or replaced, or, while much is left, one of the likeliest others or several at once are added.
 
 What the present model leaves is what an independent sample may be off by: at first the residual of the base model, so
 only strong effects are added; the better the model, the finer the effects that it tells.
@@ -13,21 +13,23 @@ only strong effects are added; the better the model, the finer the effects that 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 
-from smajax.attribution.exclusive_effects import exclude_each_other, in_another_way, of_groups
+from smajax.attribution.detectable_effects import detectable
+from smajax.attribution.exclusive_effects import in_another_way, of_groups, replaceable
 from smajax.attribution.fit_programs import grouped
 from smajax.attribution.joint_parameters import JointParameters
-from smajax.attribution.laplace_evidence import FittedModel, decomposed, fitted_model, independent_error
+from smajax.attribution.laplace_evidence import FittedModel, fitted_model, independent_error
+from smajax.attribution.program_fits import EndedFit, comparison_settings, fits_by_program
 from smajax.attribution.set_starts import at_usual_size, starts
 from smajax.attribution.subset_evidence import LinearModel, Subset, linear_model
 from smajax.attribution.traces import Traces, Variant, traces_at
-from smajax.core.progress import Stage, part_of
-from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
+from smajax.attribution.unknown.search import AskedFor
+from smajax.core.progress import Stage
+from smajax.fit.levenberg_marquardt import FitSettings
 from smajax.fit.outputs_of_runs import made_ready
 from smajax.fit.starts import nearest
 from smajax.model.effects.candidate import Extent
@@ -35,22 +37,15 @@ from smajax.model.effects.candidate import Extent
 MOST_ROUNDS = 20  # the evidence rises in every one of them, so this only ends what should have ended
 FITTED = 4  # sets a round
 REACH = 5.0  # nats below the best set in the linear model, within which a set is worth a fit
-STEPS = 30  # of a fit whose evidence is compared
-SETTLED_COST = 0.02  # a hundredth in log evidence, by which a step of such a fit may still lower the cost
-ALLOWED_EXCESS = (
-    (4, 400.0),
-    (8, 200.0),
-    (14, 100.0),
-)  # after so many steps fits end whose cost is so far above the least
-# Far behind by what is still to come: 15 nats, which no smaller number of parameters makes up for.
-PROMISED_EXCESS = (4, 30.0)
-ONE_OF_EACH = 4  # steps, after which of the fits of one set from two places the better one alone goes on
 SETTLED = 0.05  # relative change of the error of a sample
-DETECTABLE = 1.0  # standard errors that an effect of one width has to change the runs by to be looked for
 CERTAIN = 100.0  # nats that the linear model loses without an effect, beyond which no refit makes up for it
 UNEXPLAINED = 2.0  # noises that a sample may be off by, from which the likeliest others are fitted beside the effects
 REPLACED = 2  # other effects that are tried in the place of each at the end
 NEIGHBOURS = 12  # of these sets and those without an effect, the likeliest in the linear model
+AT_ONCE = 2  # sets that add several effects, where no one more makes the model likelier, of the `REACHED` likeliest
+REACHED = 12
+LEAVES_IN_LINEAR = 4.0  # noises, up to which such a set may come down to noise when it is fitted
+MANY = 3  # effects that leave much: from here on they stand in for something else, and one more changes little
 SETTLED_ODDS = 1.0  # log odds: a model that is likelier by less is as likely, and the average has both
 
 
@@ -75,6 +70,11 @@ class JointSearch:
     rounds_before: int = 0  # of an earlier search, from whose models this one begins
     thorough: bool = True  # ends only where no effect of the likeliest model can be removed or replaced
     on_round: Callable[[JointRound], None] = lambda _: None
+    # What the search goes on from in the place of a model of many effects, itself where nothing is to be sought beside it; None: as it is.
+    in_place_of_many: Callable[[FittedModel], FittedModel | None] = lambda _: None
+    # What it goes on from where it would end with a model; None: it ends.
+    before_the_end: Callable[[FittedModel], FittedModel | None] = lambda _: None
+    lacking: AskedFor | None = None  # unknown terms beside the base model, where they were asked for
 
     def error(self, model: FittedModel) -> float:
         """`independent_error` of what `model` leaves."""
@@ -122,8 +122,16 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
     checked: set[tuple[str, ...]] = set()  # models whose effects were removed and replaced one by one
     left: set[tuple[str, ...]] = set()  # models that were the likeliest before
     ended: list[FittedModel] = []  # models about which none is likelier
+    widened: set[tuple[str, ...]] = set()  # models beside which several effects at once were tried
     shapes: set[tuple[str, ...]] = set()  # effects of groups of these, and of what was searched around in their place
     for number in range(MOST_ROUNDS):
+        if present.effects in checked or any(len(effects) >= MANY for effects in left):
+            # Not before a round has removed what a model of many effects has too much.
+            other = search.in_place_of_many(present)
+            if other is present:
+                break
+            if other is not None:
+                ended, present, error = [*ended, present], _noted(search, present, other), search.error(other)
         search.joint = dataclasses.replace(search.joint, width_factors=present.width_factors)
         linear, traces = _linear(search, present, error)
         last = present.effects in checked
@@ -151,18 +159,39 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
         alike = last and done.best_gain < SETTLED_ODDS
         if alike or (not moved and settled):
             explained = not present.effects and error < UNEXPLAINED * search.noise
-            if last or explained or not search.thorough:
-                shapes.add(of_groups(present.effects))
-                other = in_another_way(search.fitted.values(), present, shapes, error, SETTLED_ODDS)
-                if explained or not search.thorough or other is None:
-                    break
-                ended, shapes = [*ended, present], shapes | {of_groups(other.effects)}
-                present, error = other, search.error(other)
-            checked.add(present.effects)
+            if explained or not search.thorough:
+                break
+            if not last:
+                checked.add(present.effects)
+                continue
+            shapes.add(of_groups(present.effects))
+            other = in_another_way(search.fitted.values(), present, shapes, error, SETTLED_ODDS)
+            if other is not None:
+                checked.add(other.effects)
+            elif present.effects not in widened:
+                widened.add(present.effects)
+                # `traces` are those of the model that the round began with.
+                several = None if moved else _several_at_once(search, present, traces, error, number)
+                other = several or search.before_the_end(present)
+                other = other and _noted(search, present, other)
+            if other is None:
+                break
+            ended, shapes = [*ended, present], shapes | {of_groups(other.effects)}
+            present, error = other, search.error(other)
     present = max([*ended, present], key=lambda model: model.log_evidence(error**2))
     search.joint = dataclasses.replace(search.joint, width_factors=present.width_factors)
     search.winner = present.effects
     return present
+
+
+def _noted(search: JointSearch, present: FittedModel, other: FittedModel) -> FittedModel:
+    """`other`, which is likelier than `present` at the error that it leaves itself, as what a round ended with."""
+    error = search.error(other)
+    gain = other.log_evidence(error**2) - present.log_evidence(error**2)
+    done = JointRound(error, present.effects, ((other.effects, gain, other.rms),), other.effects, gain)
+    search.rounds.append(done)
+    search.on_round(done)
+    return other
 
 
 def _effects(search: JointSearch, subset: Subset) -> tuple[str, ...]:
@@ -180,31 +209,6 @@ def _linear(search: JointSearch, present: FittedModel, error: float) -> tuple[Li
     for start in {frozenset(), here}:
         linear.climb(start)
     return linear, traces
-
-
-def detectable(joint: JointParameters, traces: Traces, noise: float) -> tuple[str, ...]:
-    """Effects of which one width would change the runs by more than the noise hides, beside what the unknowns absorb.
-
-    The unknowns absorb within their priors: with the values of presets free, some combinations of them change next to
-    nothing, and without a prior the remainder of rounding along these would absorb everything.
-    """
-    columns = [
-        traces.columns[name] * joint.scale(name, float(traces.values[joint.slots[name]])) for name in joint.unknowns
-    ]
-    matrix = np.stack(columns, axis=1) if columns else np.zeros((len(traces.residual), 0))
-    precision = np.diag([joint.precision(name) for name in joint.unknowns])
-    normal = matrix.T @ matrix + noise**2 * precision
-    eigenvalues, vectors, size = decomposed(normal)
-    root = np.sqrt(eigenvalues)
-    found = []
-    for variant, own in traces.variants.items():
-        for name in joint.switches(variant.effect):
-            column = own[name] * joint.priors[name].sigma
-            absorbed = (vectors.T @ (size * (matrix.T @ column))) / root
-            left = np.sqrt(max(float(column @ column - absorbed @ absorbed), 0.0))
-            if variant.effect not in found and left > DETECTABLE * noise:
-                found.append(variant.effect)
-    return joint.ordered(found)
 
 
 def _promising(search: JointSearch, linear: LinearModel, present: FittedModel, error: float) -> list[Subset]:
@@ -232,10 +236,10 @@ def _fresh(search: JointSearch, effects: tuple[str, ...], error: float) -> bool:
 
 
 def _neighbours(search: JointSearch, linear: LinearModel, present: FittedModel, error: float) -> list[Subset]:
-    """The present model without each of its effects, with the likeliest others in the place of each, and, while much is left, with the likeliest beside them.
+    """The present model without each of its effects, with the likeliest others in the place of each, and, while much is left beside few effects, with the likeliest beside them.
 
     A sample may then be off by so much that the linear model tells effects hardly apart, and one that is far from linear comes late in it.
-    In the place of one of a group all others of it are tried: the farther they are from nothing the less a derivative there says of them.
+    In the place of one of a group (`replaceable`) all others of it are tried: the farther they are from nothing the less a derivative there says of them.
     """
     here: Subset = frozenset(Variant(effect, -1) for effect in present.effects)
     others = [one for one in linear.places if one.effect not in present.effects]
@@ -248,17 +252,65 @@ def _neighbours(search: JointSearch, linear: LinearModel, present: FittedModel, 
         near += [here - {gone}, *likeliest(here - {gone})[:REPLACED]]
     near = [one for one in near if linear.log_evidence(one) > linear.log_evidence(here) - CERTAIN]
     near = sorted(near, key=lambda one: -linear.log_evidence(one))[:NEIGHBOURS]
-    alike = [here - {gone} | {one} for gone in here for one in others if exclude_each_other((gone.effect, one.effect))]
+    alike = [here - {gone} | {one} for gone in here for one in others if replaceable(gone.effect, one.effect)]
     alike.sort(key=linear.log_evidence)  # of several places of an effect the last one counts
     near = list({_effects(search, one): one for one in (*near, *alike)}.values())
     near = [one for one in near if _fresh(search, _effects(search, one), error)]
-    if error < UNEXPLAINED * search.noise:
+    if error < UNEXPLAINED * search.noise or len(present.effects) >= MANY:
         return near
     beside: dict[tuple[str, ...], Subset] = {}
     for one in likeliest(here):
         if np.isfinite(linear.log_evidence(one)) and _effects(search, one) not in search.fitted:
             beside.setdefault(_effects(search, one), one)
     return [*near, *list(beside.values())[:NEIGHBOURS]]
+
+
+def _several_at_once(
+    search: JointSearch, present: FittedModel, traces: Traces, error: float, number: int
+) -> FittedModel | None:
+    """A model with several effects more that leaves little more than noise, where no one effect more makes `present`, of few effects, likelier.
+
+    What a sample may be off by is large as long as something is missing. So of two effects that do little without each other neither is likelier than none, though
+    with both next to nothing is left. The linear model is searched as if a sample were off by the geometric mean of that and the noise,
+    and sets are fitted that leave little more than noise there; one counts where it is likelier at the error that it leaves itself. What
+    it has too much goes in the rounds that follow.
+    """
+    if error < UNEXPLAINED * search.noise or len(present.effects) >= MANY:
+        return None
+    level = float(np.sqrt(error * search.noise))
+    linear = linear_model(search.joint, traces, level**2, search.detectable)
+    here: Subset = frozenset(Variant(effect, -1) for effect in present.effects)
+    for start in {frozenset(), here}:
+        linear.climb(start)
+    sets: dict[tuple[str, ...], Subset] = {}
+    for subset in linear.ranked()[:REACHED]:
+        effects = _effects(search, subset)
+        if effects not in search.fitted and linear.rms(subset) < LEAVES_IN_LINEAR * search.noise:
+            sets.setdefault(effects, subset)
+    if not sets:
+        return None
+    _fit(search, list(sets.values())[:AT_ONCE], linear, traces, level, number)
+    fitted = [search.fitted[effects] for effects in sets if effects in search.fitted]
+
+    def ahead(model: FittedModel) -> float:
+        variance = search.error(model) ** 2
+        return model.log_evidence(variance) - present.log_evidence(variance)
+
+    better = [one for one in fitted if one.rms < UNEXPLAINED * search.noise and search.error(one) < error]
+    best = max(better, key=ahead, default=None)
+    return best if best is not None and ahead(best) > SETTLED_ODDS else None
+
+
+def fitted_alone(search: JointSearch, effects: Sequence[str], error: float) -> list[FittedModel]:
+    """The base model with one of `effects` each, of those that the runs can show; `error` of an independent sample, SI."""
+    linear, traces = _linear(search, search.fitted[()], error)
+    places: dict[str, Variant] = {}
+    for one in sorted(linear.places, key=lambda one: linear.log_evidence(frozenset({one}))):
+        places[one.effect] = one  # the likeliest
+    sets = [frozenset({places[effect]}) for effect in effects if effect in places and (effect,) not in search.fitted]
+    if sets:
+        _fit(search, sets, linear, traces, error, len(search.rounds))
+    return [search.fitted[effect,] for effect in effects if (effect,) in search.fitted]
 
 
 def _fit(
@@ -317,39 +369,6 @@ def _fit_side_by_side(
             search.fitted[effects] = model
 
 
-class EndedFit(NamedTuple):
-    """Of a set of effects, in the program that carries some."""
-
-    effects: tuple[str, ...]
-    program: tuple[str, ...]
-    values: np.ndarray  # (P,)
-    cost: float
-
-
-def fits_by_program(
-    joint: JointParameters,
-    groups: Sequence[tuple[tuple[str, ...], Sequence[tuple[tuple[str, ...], np.ndarray]]]],
-    error: float,
-    settings: FitSettings,
-) -> Iterator[EndedFit]:
-    """Fits of sets of effects, by program: `groups` of (effects that it carries, (set, values (P,) that its fit begins with) each).
-
-    Those of one program go side by side; the least cost so far ends what is far behind it in the next.
-    """
-    progress, least = settings.progress, settings.least_cost
-    for place, (program, begun) in enumerate(groups):
-        problem, index = joint.restricted(program)
-        problem = problem.with_noise(error)
-        tasks = [problem.task(joint.free(effects), joint.bounds, values[index]) for effects, values in begun]
-        own = dataclasses.replace(settings, progress=part_of(progress, place, len(groups)), least_cost=least)
-        fits = levenberg_marquardt(problem, tasks, own)
-        least = min([least, *(fit.cost for fit in fits)])
-        for (effects, start), fit in zip(begun, fits, strict=True):
-            values = np.array(start)
-            values[index] = fit.values
-            yield EndedFit(effects, program, values, fit.cost)
-
-
 def _grouped(
     search: JointSearch, sets: Iterable[tuple[str, ...]]
 ) -> list[tuple[tuple[str, ...], list[tuple[str, ...]]]]:
@@ -362,39 +381,9 @@ def _grouped(
     return found
 
 
-def comparison_settings(settings: FitSettings, stage: str) -> FitSettings:
-    """Of fits whose evidence is compared: those that fall far behind end early."""
-    return dataclasses.replace(
-        settings,
-        max_steps=STEPS,
-        absolute_tolerance=SETTLED_COST,
-        allowed_excess=ALLOWED_EXCESS,
-        promised_excess=PROMISED_EXCESS,
-        one_of_each=ONE_OF_EACH,
-        stage=stage,
-    )
-
-
 def fitted_from(search: JointSearch, model: FittedModel) -> FittedModel:
     """The effects of `model`, fitted with every free parameter of `search` from its values; `model` where that fit has no number."""
     error = search.error(model)
     stage = "fitting the base model with the values of presets free"
     _fit_side_by_side(search, [(model.effects, model.values)], error, stage, compared=False)
     return search.fitted.get(model.effects, model)
-
-
-def refined(search: JointSearch, model: FittedModel, error: float) -> FittedModel:
-    """A fitted model taken to its optimum, which standard errors need; `error` of an independent sample, SI."""
-    joint = search.joint
-    problem, index = joint.restricted(model.effects)
-    problem = problem.with_noise(error)
-    task = problem.task(model.names, joint.bounds, model.values[index])
-    settings = dataclasses.replace(search.settings, stage="taking the model to its optimum")
-    (fit,) = levenberg_marquardt(problem, [task], settings)
-    values = np.array(model.values)
-    values[index] = fit.values
-    best = fitted_model(joint, model.effects, values, model.effects)
-    if not best.log_evidence(error**2) > model.log_evidence(error**2):
-        return model
-    search.fitted[model.effects] = best
-    return best

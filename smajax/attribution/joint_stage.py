@@ -13,18 +13,30 @@ from functools import partial
 import numpy as np
 
 from smajax.attribution.findings import LikelierModel, NoLikelierModel, Reason, Round, StepDependent
-from smajax.attribution.joint_search import JointRound, JointSearch, fitted_from, refined, search_jointly
+from smajax.attribution.joint_search import (
+    MANY,
+    JointRound,
+    JointSearch,
+    fitted_alone,
+    fitted_from,
+    search_jointly,
+)
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model
 from smajax.attribution.leave_one_run_out import predicting
 from smajax.attribution.model_fits import Evidence, Model, Search, Start
 from smajax.attribution.step_size_check import gain_kept_at_half_step
+from smajax.attribution.unknown.search import AskedFor, asked_for
+from smajax.attribution.unknown.terms import UNKNOWN
 from smajax.core.whiteness import on_samples
-from smajax.fit.levenberg_marquardt import Fit, FitSettings
+from smajax.fit.levenberg_marquardt import Fit, FitSettings, levenberg_marquardt
 from smajax.model.effects.library import LIBRARY
 from smajax.model.effects.prior_width import CoefficientPrior
 
 LIKELIEST = 4  # sets of effects from which the search goes on with the values of presets free
 FREED_SHARE = 2.0 / 3.0  # of the base error, to which free values of presets lower it where the search begins so
+STAND_INS = (
+    3  # effects that leave more than noise: from here on one unknown function that leaves only noise ends a search
+)
 SETTLED_COST = 1e-4  # of twice the log-likelihood: the optimum to within a hundredth of a standard error
 
 
@@ -33,6 +45,7 @@ class _Stage:
     setting: Search
     settings: FitSettings
     excluded: set[str] = field(default_factory=set)
+    asked: list[AskedFor] = field(default_factory=list)  # unknown terms beside the base model, once they were asked for
 
     def joint_search(self, presets: Mapping[str, CoefficientPrior]) -> JointSearch:
         """Among the candidates that were not excluded."""
@@ -51,6 +64,9 @@ class _Stage:
             thorough=bool(presets) or not setting.presets,  # the last search
         )
         search.on_round = partial(self.note, search)
+        if search.thorough:  # else values of presets are held, which no function is beside
+            search.in_place_of_many = partial(self.in_place_of_many, search)
+            search.before_the_end = partial(self.before_the_end, search)
         return search
 
     def searched(self, base: np.ndarray) -> tuple[JointSearch, FittedModel]:
@@ -59,13 +75,14 @@ class _Stage:
         Where more than noise is left, the search is made again from the base model without the effects of bench and events that were found. One of
         these may have come first because it does a part of what several effects of the wire do together, and no step of the search,
         which changes one effect at a time, takes it out again. If what is found then is likelier, the search goes on from there with
-        all effects. On the measured bias-spring bench a limit of the sensor stood for three others.
+        all effects. On the measured bias-spring bench a limit of the sensor stood for three others. Many effects that leave much all the same stand
+        for something else anyhow.
         """
         search, found = self._from_base(base, ())
         doubted = [effect for effect in found.effects if LIBRARY[effect].candidate.prior_class != "material"]
-        if not doubted or self._leaves_noise(found):
+        if not doubted or len(found.effects) >= MANY or self._leaves_noise(found):
             return search, found
-        rest = _Stage(self.setting, self.settings, self.excluded | set(doubted))
+        rest = _Stage(self.setting, self.settings, self.excluded | set(doubted), self.asked)
         other, instead = rest._from_base(base, search.programs)
         search.fitted = {**other.fitted, **search.fitted}
         error = search.error(search.best(search.error(found)))
@@ -93,18 +110,78 @@ class _Stage:
         held.programs = free.programs
         return self.resumed(held, search_jointly(held, {(): base}))
 
+    def in_place_of_many(self, search: JointSearch, found: FittedModel) -> FittedModel | None:
+        """`found` itself where it has many effects that leave more than noise, and an unknown function in the base model that is named leaves only noise and is likelier.
+
+        The effects then stand in for it, and every one that is added has less to go by. One effect of the function's equation that is
+        likelier than they are comes first.
+        """
+        if len(found.effects) < MANY or self._leaves_noise(found):
+            return None
+        named = self._asked(search).found.likeliest
+        if named is None or not self._leaves_noise(named) or not self._likelier(search, found, [named]):
+            return None
+        return self._one_effect(search, found, [named]) or found
+
+    def before_the_end(self, search: JointSearch, found: FittedModel) -> FittedModel | None:
+        """One effect that is likelier than those of `found`, in an equation where an unknown function is likelier than these too."""
+        if not found.effects or (len(found.effects) < self.setting.config.many_effects and self._leaves_noise(found)):
+            return None
+        fits = self._asked(search).fits
+        functions = self._likelier(search, found, () if fits is None else fits.fitted)
+        return self._one_effect(search, found, functions) if functions else None
+
+    def _asked(self, search: JointSearch) -> AskedFor:
+        """Unknown functions beside the base model, whose values of presets are free in them as well."""
+        if not self.asked:
+            self.asked.append(asked_for(self.setting, search.fitted[()]))
+        search.lacking = self.asked[0]
+        return self.asked[0]
+
+    def _one_effect(
+        self, search: JointSearch, found: FittedModel, functions: Sequence[FittedModel]
+    ) -> FittedModel | None:
+        """The likeliest base model with one effect of the equations of `functions`, if it is likelier than `found`."""
+        equations = {UNKNOWN[model.effects[-1]].candidate.equation for model in functions}
+        alike = [name for name in search.joint.coefficients if LIBRARY[name].candidate.equation in equations]
+        alone = fitted_alone(
+            search, [name for name in alike if name not in search.excluded], search.error(functions[0])
+        )
+        likelier = self._likelier(search, found, alone)
+        return likelier[0] if likelier and likelier[0].effects != found.effects else None
+
+    def _likelier(self, search: JointSearch, found: FittedModel, models: Sequence[FittedModel]) -> list[FittedModel]:
+        """Those of `models` that are likelier than `found`, the likeliest first."""
+        variance = min(map(search.error, (found, *models))) ** 2
+        ahead = [one for one in models if one.log_evidence(variance) > found.log_evidence(variance)]
+        return sorted(ahead, key=lambda one: -one.log_evidence(variance))
+
     def _leaves_noise(self, model: FittedModel) -> bool:
         mask = np.asarray(self.setting.problem.batch.mask)
         return self.setting.all_noise(on_samples(model.residual, mask), mask)
 
-    def resumed(self, search: JointSearch, found: FittedModel | None = None) -> tuple[JointSearch, FittedModel]:
+    def resumed(
+        self, search: JointSearch, found: FittedModel | None = None, base: np.ndarray | None = None
+    ) -> tuple[JointSearch, FittedModel]:
         """(search, likeliest model) from the likeliest sets that `search` has fitted, with the values of presets free.
 
         `found`: its likeliest. None: sets that have an excluded effect do not count, and the likeliest of the others is that.
+        `base`: values (P,) of the base model; None: those of `search`.
         """
         again = self.joint_search(self.setting.presets)
         again.programs = search.programs
-        return again, search_jointly(again, self._starts(search, found))
+        starts = self._starts(search, found)
+        if base is not None:
+            # What is held now lies where the base model has it.
+            held = [
+                slot
+                for name, slot in again.joint.slots.items()
+                if name not in again.joint.free(tuple(again.joint.coefficients))
+            ]
+            for values in starts.values():
+                values[held] = base[held]
+            starts[()] = base
+        return again, search_jointly(again, starts)
 
     def _starts(self, search: JointSearch, found: FittedModel | None) -> dict[tuple[str, ...], np.ndarray]:
         """Values (P,) of the likeliest sets without an excluded effect, the base model and each effect of the likeliest alone among them."""
@@ -112,7 +189,7 @@ class _Stage:
         error = search.error(found) if found is not None else min(map(search.error, fitted.values()))
         likeliest = sorted(fitted.values(), key=lambda model: -model.log_evidence(error**2))[:LIKELIEST]
         alone = [fitted[one,] for one in likeliest[0].effects if (one,) in fitted]
-        return {model.effects: model.values for model in (fitted[()], *alone, *likeliest)}
+        return {model.effects: np.array(model.values) for model in (fitted[()], *alone, *likeliest)}
 
     def exclude(self, effects: Sequence[str], kept: float) -> None:
         """Effects that keep only that share of their gain at half the step."""
@@ -163,6 +240,15 @@ def search_without(setting: Search, search: JointSearch, effects: Sequence[str])
     return _kept_at_half_step(stage, lambda: stage.resumed(search))
 
 
+def search_again(setting: Search, base: Fit, search: JointSearch) -> tuple[JointSearch, Model, Model]:
+    """As `search_by_evidence`, from the likeliest models that `search` has fitted with another integration.
+
+    Which effects these are rarely depends on it; how likely they are does. An effect that did not keep its gain then may keep it now.
+    """
+    stage = _Stage(setting, _settings(setting))
+    return _kept_at_half_step(stage, lambda: stage.resumed(search, base=base.values))
+
+
 def _settings(setting: Search) -> FitSettings:
     return FitSettings(tolerance=setting.config.final_convergence, cache=setting.cache, progress=setting.progress)
 
@@ -189,6 +275,23 @@ def _kept_at_half_step(
         if (effect,) in search.fitted:
             seen.alone_rmse = search.fitted[(effect,)].rms
     return search, first, final
+
+
+def refined(search: JointSearch, model: FittedModel, error: float) -> FittedModel:
+    """A fitted model taken to its optimum, which standard errors need; `error` of an independent sample, SI."""
+    joint = search.joint
+    problem, index = joint.restricted(model.effects)
+    problem = problem.with_noise(error)
+    task = problem.task(model.names, joint.bounds, model.values[index])
+    settings = dataclasses.replace(search.settings, stage="taking the model to its optimum")
+    (fit,) = levenberg_marquardt(problem, [task], settings)
+    values = np.array(model.values)
+    values[index] = fit.values
+    best = fitted_model(joint, model.effects, values, model.effects)
+    if not best.log_evidence(error**2) > model.log_evidence(error**2):
+        return model
+    search.fitted[model.effects] = best
+    return best
 
 
 def final_model(search: JointSearch, setting: Search, found: FittedModel, error: float) -> Model:

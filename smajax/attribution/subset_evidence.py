@@ -51,6 +51,8 @@ class LinearModel:
     precision: np.ndarray
     one_sided: np.ndarray
     log_odds: dict[Variant, float]
+    squares: float  # of the outputs where all coefficients are at their base, SI squared
+    variance: float  # of an independent sample, SI squared
     cached: dict[Subset, float] = field(default_factory=dict)
 
     def log_evidence(self, subset: Subset) -> float:
@@ -82,17 +84,29 @@ class LinearModel:
 
     def estimate(self, subset: Subset) -> Estimate:
         """Posterior mean of all parameters of a model with `subset`."""
-        columns = self._columns(subset)
-        matrix = self.gram[np.ix_(columns, columns)] + np.diag(self.precision[columns])
-        # `solve` would warn of a matrix that is nearly singular, as it is where the runs do not tell parameters apart.
-        factor = scipy.linalg.cho_factor(matrix)
-        mean = scipy.linalg.cho_solve(factor, self.right[columns]) * self.scales[columns]
+        columns, mean = self._mean(subset)
+        mean = mean * self.scales[columns]
         values = {self.names[column]: float(one) for column, one in zip(columns, mean, strict=True)}
         own = set(self.unknowns)
         return Estimate(
             {name: one for name, one in values.items() if name not in own},
             {name: one for name, one in values.items() if name in own},
         )
+
+    def rms(self, subset: Subset) -> float:
+        """Root mean square of what a model with `subset` leaves there, SI."""
+        columns, mean = self._mean(subset)
+        explained = 2.0 * self.right[columns] @ mean - mean @ self.gram[np.ix_(columns, columns)] @ mean
+        squares = self.squares - self.variance * float(explained)
+        return float(np.sqrt(max(squares, 0.0) / len(self.traces.residual)))
+
+    def _mean(self, subset: Subset) -> tuple[list[int], np.ndarray]:
+        """(columns, posterior means of their parameters, in widths of the priors)."""
+        columns = self._columns(subset)
+        matrix = self.gram[np.ix_(columns, columns)] + np.diag(self.precision[columns])
+        # `solve` would warn of a matrix that is nearly singular, as it is where the runs do not tell parameters apart.
+        factor = scipy.linalg.cho_factor(matrix)
+        return columns, scipy.linalg.cho_solve(factor, self.right[columns])
 
     def climb(self, start: Subset) -> Subset:
         """From `start` by adding, removing or replacing one effect at a time, as long as the evidence rises."""
@@ -163,6 +177,8 @@ def linear_model(joint: JointParameters, traces: Traces, variance: float, candid
         precision=np.asarray([joint.precision(name) for name in names]),
         one_sided=np.asarray([joint.one_sided(name) for name in names], dtype=bool),
         log_odds=_odds(joint, places),
+        squares=float(target @ target),
+        variance=variance,
     )
 
 

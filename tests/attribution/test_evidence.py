@@ -31,17 +31,19 @@ def _linear(one_sided: bool, sizes: tuple[float, float], seed: int = 0) -> tuple
     search = hot_weight({})
     return (
         LinearModel(
-            None,  # type: ignore[arg-type]  # neither traces nor parameters are read for the evidence
-            search.joint,
-            [],
-            {A: [0], B: [1]},
-            ["a", "b"],
-            np.ones(2),
-            columns.T @ columns,
-            columns.T @ outputs,
-            np.ones(2),
-            np.asarray([one_sided, False]),
-            {A: np.log(0.1), B: np.log(0.03)},
+            traces=None,  # type: ignore[arg-type]  # neither traces nor parameters are read for the evidence
+            joint=search.joint,
+            unknowns=[],
+            places={A: [0], B: [1]},
+            names=["a", "b"],
+            scales=np.ones(2),
+            gram=columns.T @ columns,
+            right=columns.T @ outputs,
+            precision=np.ones(2),
+            one_sided=np.asarray([one_sided, False]),
+            log_odds={A: np.log(0.1), B: np.log(0.03)},
+            squares=float(outputs @ outputs),
+            variance=1.0,
         ),
         columns,
         outputs,

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from smajax.attribution import joint_search
+from smajax.attribution.detectable_effects import detectable
 from smajax.attribution.joint_parameters import JointParameters
-from smajax.attribution.joint_search import JointSearch, detectable, search_jointly
-from smajax.attribution.laplace_evidence import fitted_model
+from smajax.attribution.joint_search import JointSearch, search_jointly
+from smajax.attribution.laplace_evidence import FittedModel, fitted_model
 from smajax.attribution.leave_one_run_out import left_out
 from smajax.attribution.set_starts import PLACES, starts
 from smajax.attribution.subset_evidence import linear_model
@@ -59,6 +60,74 @@ def test_while_much_is_left_each_likely_effect_is_fitted_before_the_search_ends(
     search, values, _ = _found({"latent_heat.enthalpy": 1.2e4})
     assert set(values) == {"latent_heat.enthalpy"}
     assert len(search.rounds[1].gains) > joint_search.FITTED
+
+
+def test_several_effects_are_added_at_once_where_none_by_itself_makes_the_model_likelier(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Here the search offers no set of effects at all, one at a time; what several at once have too much goes again."""
+    promising = joint_search._promising
+    monkeypatch.setattr(joint_search, "_promising", lambda *given: promising(*given) if given[2].effects else [])
+    monkeypatch.setattr(joint_search, "_neighbours", lambda *_: [])
+    search, values, errors = _found({"latent_heat.enthalpy": 600.0, "phase_resistance.contrast": -0.01})
+    assert set(values) == {"latent_heat.enthalpy", "phase_resistance.contrast"}
+    assert values["latent_heat.enthalpy"] == pytest.approx(600.0, abs=4.0 * errors["latent_heat.enthalpy"])
+    assert search.rounds[-1].present == search.winner
+
+
+def test_where_noise_would_remain_in_no_linear_model_several_effects_are_not_fitted(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(joint_search, "_promising", lambda *_: [])
+    monkeypatch.setattr(joint_search, "_neighbours", lambda *_: [])
+    monkeypatch.setattr(joint_search, "LEAVES_IN_LINEAR", 0.5)
+    search, values, _ = _found({"latent_heat.enthalpy": 1.2e4})
+    assert values == {}
+    assert set(search.fitted) == {()}
+
+
+def test_a_search_ends_where_nothing_is_to_be_sought_beside_a_model(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(joint_search, "MANY", 0)  # each model has many effects
+    search = hot_weight({"latent_heat.enthalpy": 1.2e4})
+    search.in_place_of_many = lambda model: model if model.effects else None
+    found = search_jointly(search, {(): search.joint.problem.start_values()})
+    assert found.effects
+    assert len(search.rounds) == 1
+
+
+def test_a_search_goes_on_from_what_is_named_before_its_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Here it offers no set of effects by itself, and is given one effect of those that were fitted alone."""
+    for name in ("_promising", "_neighbours"):
+        monkeypatch.setattr(joint_search, name, lambda *_: [])
+    monkeypatch.setattr(joint_search, "LEAVES_IN_LINEAR", 0.0)
+    search = hot_weight({"latent_heat.enthalpy": 1.2e4})
+
+    def named(found: FittedModel) -> FittedModel | None:
+        alone = joint_search.fitted_alone(search, ["latent_heat", "sensor_gain"], search.error(found))
+        assert [one.effects for one in alone] == [("latent_heat",), ("sensor_gain",)]
+        return None if found.effects else alone[0]
+
+    search.before_the_end = named
+    found = search_jointly(search, {(): search.joint.problem.start_values()})
+    assert found.effects == ("latent_heat",)
+    assert set(search.fitted) == {(), ("latent_heat",), ("sensor_gain",)}
+    # The step is a round of its own, as it is shown.
+    assert [(done.present, done.best) for done in search.rounds if done.best != done.present] == [
+        ((), ("latent_heat",))
+    ]
+
+
+def test_what_a_linear_model_leaves_is_the_residual_of_its_estimate() -> None:
+    search = hot_weight({"latent_heat.enthalpy": 1.2e4})
+    base = fitted_model(search.joint, (), search.joint.problem.start_values(), ())
+    traces = traces_at(search.joint, base, search.extent)
+    linear = linear_model(search.joint, traces, NOISE**2, CANDIDATES)
+    subset = frozenset({Variant("latent_heat", -1), Variant("phase_resistance", -1)})
+    estimate = linear.estimate(subset)
+    steps = {**estimate.unknowns, **estimate.coefficients}
+    left = traces.residual - sum(traces.columns[name] * step for name, step in steps.items())
+    assert linear.rms(subset) == pytest.approx(float(np.sqrt(np.mean(left**2))), rel=1e-6)
+    assert linear.rms(subset) < linear.rms(frozenset())
 
 
 @pytest.mark.slow
@@ -221,6 +290,7 @@ def test_two_models_that_are_as_likely_do_not_take_turns(monkeypatch: pytest.Mon
     monkeypatch.setattr(joint_search, "_grouped", lambda *_: [])
     monkeypatch.setattr(joint_search, "_fit_side_by_side", lambda *_, **__: None)
     monkeypatch.setattr(joint_search, "_linear", lambda *_: (None, None))
+    monkeypatch.setattr(joint_search, "_several_at_once", lambda *_: None)
     for name in ("_neighbours", "_promising"):
         monkeypatch.setattr(joint_search, name, lambda *_: [])
     joint_search.search_jointly(search, {})

@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from importlib import resources
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
-import smajax.attribution.joint_stage
-from smajax.attribution.close_loop import close_loop, prepared, searched
+from smajax.attribution import joint_stage
+from smajax.attribution.close_loop import close_loop, prepared
 from smajax.attribution.config import AttributionConfig
 from smajax.attribution.findings import Findings, LikelierModel, StepDependent
+from smajax.attribution.joint_stage import search_by_evidence
+from smajax.attribution.unknown.search import AskedFor, Lacking
 from smajax.core.progress import quiet
 from smajax.core.result_cache import ResultCache
 from smajax.data.experiment.load import load_experiment
 from smajax.data.experiment.record import Experiment
 from smajax.data.model_catalogue import CATALOGUE
+from smajax.fit.levenberg_marquardt import FitSettings
 from smajax.model.effects.library import LIBRARY
 from smajax.report.html import findings_to_html
 from smajax.report.json_file import findings_to_json
@@ -67,13 +73,127 @@ def test_an_effect_that_gains_nothing_at_half_the_step_is_excluded(monkeypatch: 
     """The latent heat passes for one with which the load jumps; the search is made again without it, and says so."""
     kept = iter((0.1, 1.0))
     candidate = LIBRARY["latent_heat"].candidate
-    monkeypatch.setattr(smajax.attribution.joint_stage, "gain_kept_at_half_step", lambda *_: next(kept, 1.0))
+    monkeypatch.setattr(joint_stage, "gain_kept_at_half_step", lambda *_: next(kept, 1.0))
     monkeypatch.setattr(
         LIBRARY["latent_heat"],
         "candidate",
         dataclasses.replace(candidate, stick_slip=True),
     )
     context = prepared(_demo(FEW[:2], runs=2), ResultCache(), quiet, 1, AttributionConfig())
-    assert "latent_heat" not in searched(context).final.effects
+    _, _, final = search_by_evidence(context.setting, context.base)
+    assert "latent_heat" not in final.effects
     (excluded,) = [one.reason for one in context.setting.rounds if isinstance(one.reason, StepDependent)]
     assert excluded.effects == "latent_heat"
+
+
+def _model(effects: Sequence[str], left: float, evidence: float) -> Any:
+    """Of a made-up fit that leaves a residual of `left`, with that log evidence at any error of a sample."""
+    return SimpleNamespace(
+        effects=tuple(effects), residual=np.full(4, left), values=np.zeros(3), log_evidence=lambda _: evidence
+    )
+
+
+def _stage_and_search(
+    monkeypatch: pytest.MonkeyPatch,
+    functions: Sequence[tuple[float, float]],
+    alone: Sequence[Any],
+    confirmed: bool = True,
+) -> tuple[Any, Any, list[Any]]:
+    """(stage, search, base models that unknown functions were asked for beside); `functions`: what each leaves, and its log evidence."""
+    setting = SimpleNamespace(
+        problem=SimpleNamespace(batch=SimpleNamespace(mask=np.ones((1, 4)))),
+        all_noise=lambda misfit, _: bool(np.max(misfit) < 1.5),
+        config=AttributionConfig(),
+    )
+    asked: list[Any] = []
+    fitted = [_model(["unknown_reading_of_time"], *one) for one in functions]
+    named = fitted[0] if fitted and confirmed else None
+    found = AskedFor(cast(Any, SimpleNamespace(fitted=fitted)), Lacking((), named))
+
+    def asked_for(_: Any, base: Any) -> AskedFor:
+        asked.append(base)
+        return found
+
+    monkeypatch.setattr(joint_stage, "asked_for", asked_for)
+
+    def fitted_alone(search: Any, effects: Sequence[str], error: float) -> list[Any]:
+        # Of the function's equation, without what was excluded.
+        assert list(effects) == ["sensor_drift"]
+        return list(alone)
+
+    monkeypatch.setattr(joint_stage, "fitted_alone", fitted_alone)
+    search = SimpleNamespace(
+        fitted={(): _model((), 9.0, 0.0)},
+        error=lambda model: float(model.residual[0]),
+        lacking=None,
+        joint=SimpleNamespace(coefficients=("latent_heat", "sensor_drift", "sensor_gain")),
+        excluded=frozenset({"sensor_gain"}),
+    )
+    return joint_stage._Stage(cast(Any, setting), FitSettings()), search, asked
+
+
+THREE = ("latent_heat", "creep", "radiation")
+
+
+@pytest.mark.parametrize(
+    ("effects", "left", "functions", "confirmed", "ended"),
+    [
+        (THREE, 5.0, [(1.0, 20.0)], True, True),
+        (THREE, 5.0, [(1.0, 20.0)], False, False),  # one run, or those left out or held out do not confirm it
+        (THREE, 5.0, [(1.0, 5.0)], True, False),  # less likely than the effects
+        (THREE, 5.0, [(2.0, 20.0)], True, False),  # leaves more than noise too
+        (THREE, 5.0, [], True, False),
+        (THREE[:2], 5.0, [(1.0, 20.0)], True, False),  # two effects may be what is missing
+        (THREE, 1.0, [(1.0, 20.0)], True, False),  # nothing more is missing
+    ],
+)
+def test_a_search_ends_where_one_unknown_function_does_what_many_effects_do_not(
+    monkeypatch: pytest.MonkeyPatch,
+    effects: tuple[str, ...],
+    left: float,
+    functions: list[tuple[float, float]],
+    confirmed: bool,
+    ended: bool,
+) -> None:
+    stage, search, asked = _stage_and_search(monkeypatch, functions, [_model(["sensor_drift"], 4.0, 3.0)], confirmed)
+    found = _model(effects, left, 10.0)
+    for _ in range(2):
+        assert stage.in_place_of_many(search, found) is (found if ended else None)
+    # Once.
+    assert asked == ([search.fitted[()]] if len(effects) > 2 and left > 1.5 else [])
+
+
+@pytest.mark.parametrize("many", [True, False])
+def test_one_effect_of_the_functions_equation_comes_before_it(monkeypatch: pytest.MonkeyPatch, many: bool) -> None:
+    """A drifting sensor is an error of the sensor that depends on the time: the function finds it, and the library has it."""
+    drift = _model(["sensor_drift"], 1.0, 21.0)
+    stage, search, _ = _stage_and_search(monkeypatch, [(1.0, 20.0)], [drift])
+    asked = stage.in_place_of_many if many else stage.before_the_end
+    assert asked(search, _model(THREE, 5.0, 10.0)) is drift
+    assert asked(search, _model(THREE, 5.0, 30.0)) is None  # likelier than the function
+    assert stage.before_the_end(search, _model(["sensor_drift"], 1.0, 10.0)) is None
+    assert stage.before_the_end(search, _model((), 5.0, 0.0)) is None
+
+
+def test_with_a_finer_integration_the_search_goes_on_from_the_likeliest_models(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of these the base model begins where that integration has fitted it."""
+    fitted = {FEW[:count]: _model(FEW[:count], 9.0 - count, 5.0) for count in range(3)}
+    search = cast(Any, SimpleNamespace(fitted=fitted, error=lambda _: 1.0, excluded=frozenset(), programs=()))
+    begun: list[Any] = []
+    joint = SimpleNamespace(
+        slots={"fitted": 0, "held": 1, "coefficient": 2}, coefficients={}, free=lambda _: ["fitted", "coefficient"]
+    )
+    monkeypatch.setattr(joint_stage._Stage, "joint_search", lambda *_: SimpleNamespace(programs=(), joint=joint))
+    monkeypatch.setattr(joint_stage, "search_jointly", lambda _, starts: begun.append(starts))
+    monkeypatch.setattr(joint_stage, "_kept_at_half_step", lambda _, searched: searched())
+    base = SimpleNamespace(values=np.ones(3))
+    joint_stage.search_again(
+        cast(Any, SimpleNamespace(presets={}, config=AttributionConfig(), cache=None, progress=quiet)),
+        cast(Any, base),
+        search,
+    )
+    (starts,) = begun
+    assert set(starts) == set(fitted)
+    assert starts[()] is base.values
+    # What is not free now lies where the base model has it.
+    assert [values.tolist() for effects, values in starts.items() if effects] == [[0.0, 1.0, 0.0]] * 2

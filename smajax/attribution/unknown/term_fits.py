@@ -1,0 +1,206 @@
+"""Models with one unknown term each, fitted: what the search of an unknown term compares."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import jax.numpy as jnp
+import numpy as np
+
+from smajax.attribution.joint_parameters import JointParameters
+from smajax.attribution.laplace_evidence import FittedModel, fitted_model, independent_error
+from smajax.attribution.model_fits import Model, Search
+from smajax.attribution.program_fits import comparison_settings, fits_by_program
+from smajax.attribution.score_test import Score, ranked
+from smajax.attribution.unknown.ranges import Sought, sought
+from smajax.attribution.unknown.terms import UNKNOWN
+from smajax.core.parameters import parameters
+from smajax.core.progress import Stage
+from smajax.data.experiment.record import Prior
+from smajax.fit.levenberg_marquardt import FitSettings
+from smajax.fit.sensitivity import sensitivity
+from smajax.fit.starts import nearest
+from smajax.model.effects.candidate import PRIOR_ODDS
+from smajax.model.effects.prior_width import CoefficientPrior
+
+INDISTINGUISHABLE = 3.0  # in log odds: twenty to one
+# Of the likeliest's log odds over no term: seven splines leave about a hundredth of a function, and in which equation they leave
+# less of it says nothing.
+APPROXIMATE = 0.01
+PASSES = 2  # the error of a sample is first that of the model without a term, then that of the best with one
+MUCH = 7e4  # samples times directions of the derivative, of one fit
+REACH = 10.0  # in log odds behind the likeliest, within which a term is fitted again with the smaller error
+
+
+def with_terms(setting: Search, final: Model | FittedModel) -> tuple[Search, np.ndarray, Sought]:
+    """(search among the terms that the runs can show, the final model's values in its order, what is sought).
+
+    One model carries them all, so that one compiled program serves the screening, every fit and every left-out run.
+    """
+    plain, index = setting.restricted(final.effects)
+    system = plain.system_at(jnp.asarray(final.values[index]))
+    found = sought(system, plain.with_own_values(final.values[index]))
+    names = tuple(term.effect_name for term in found.terms)
+    whole = dataclasses.replace(system, effects=(*system.effects, *found.terms))
+    own = [name for name in parameters(whole) if name.split(".")[0] in names]
+    known = {name: Prior(0.0, setting.config.term_prior_sigma, False) for name in own}
+    known |= setting.prior_records(presets=False)
+    own_values = dataclasses.replace(plain.per_run, start=plain.per_run_at(jnp.asarray(final.values[index])))
+    problem = plain.with_system(whole, per_run=own_values, priors=known)
+    bounds = {**setting.bounds, **dict.fromkeys(own, (-1.0, 1.0))}
+    unknowns = tuple(setting.free(final.effects))
+    search = Search(
+        problem,
+        unknowns,
+        bounds,
+        names,
+        setting.cache,
+        setting.progress,
+        setting.noise_given,
+        setting.noises_given,
+        setting.held_out,
+        config=setting.config,
+        of_unknowns=setting.of_unknowns,
+        held_out_runs=setting.held_out_runs,
+    )
+    return search, problem.start_values(), found
+
+
+def screened(setting: Search, values: np.ndarray) -> list[Score]:
+    """Every term's score test at the final model, best first."""
+    at = sensitivity(setting.problem, values, setting.every)
+    return ranked(at, setting.loose((), values), setting.candidates, setting.bounds)
+
+
+def _best_of_each(scores: Sequence[Score], count: int) -> list[Score]:
+    """The best of each equation first, then the others by gain; `count` of them that promise anything."""
+    firsts: dict[str, Score] = {}
+    for score in scores:
+        firsts.setdefault(UNKNOWN[score.effects[0]].candidate.equation, score)
+    leading = list(firsts.values())
+    rest = [score for score in scores if score not in leading]
+    return [score for score in [*leading, *rest][:count] if score.gain > 0.0]
+
+
+@dataclass(frozen=True)
+class TermFits:
+    """Models of one base with one of the terms each, fitted; likeliest first."""
+
+    search: Search
+    sought: Sought
+    joint: JointParameters
+    none: FittedModel  # the base without a term
+    fitted: tuple[FittedModel, ...]
+    gains: Mapping[str, float]  # of the score test, by term
+
+    def log_odds(self, model: FittedModel, error: float) -> float:
+        """Of a model with a term over the one without."""
+        return model.log_evidence(error**2) - self.none.log_evidence(error**2)
+
+
+def fits_with_terms(setting: Search, final: Model | FittedModel) -> TermFits | None:
+    """The terms that promise most, each fitted beside `final`; those that are `REACH` behind the likeliest are left out.
+
+    None where none promises anything.
+    """
+    search, values, found = with_terms(setting, final)
+    if not search.candidates:
+        return None
+    search.progress(Stage("looking for the equation that lacks something", 0.0))
+    scores = screened(search, values)
+    chosen = _best_of_each(scores, setting.config.terms_refitted)
+    search.progress(Stage("looking for the equation that lacks something", 1.0))
+    if not chosen:
+        return None
+    joint = joint_with_terms(setting, search, final)
+    none = fitted_model(joint, final.effects, values, tuple(joint.coefficients))
+    error = least_error(setting, [none])
+    places = first_places(search, joint, chosen, values)
+    fitted: list[FittedModel] = []
+    for _ in range(PASSES):
+        fitted = fitted_terms(search, joint, final.effects, places, error)
+        error = least_error(setting, [none, *fitted])
+        fitted.sort(key=lambda model: -model.log_evidence(error**2))
+        best = fitted[0].log_evidence(error**2)
+        least = best - max(REACH, APPROXIMATE * (best - none.log_evidence(error**2)))
+        fitted = [one for one in fitted if one.log_evidence(error**2) >= least]
+        if best < none.log_evidence(error**2) - INDISTINGUISHABLE:
+            break
+        places = {one.effects[-1]: [one.values] for one in fitted}
+    gains = {score.effects[0]: score.gain for score in scores}
+    return TermFits(search, found, joint, none, tuple(fitted), gains)
+
+
+def joint_with_terms(setting: Search, search: Search, final: Model | FittedModel) -> JointParameters:
+    """Parameters of models with the effects of `final` and one of the terms of `search`, with their priors."""
+    plain = setting.joint(final.effects)
+    own = {term: tuple(search.coefficients(term)) for term in search.candidates}
+    width = CoefficientPrior(0.0, setting.config.term_prior_sigma, False)
+    return JointParameters(
+        search.problem,
+        plain.unknowns,
+        search.bounds,
+        {**plain.coefficients, **own},
+        {**plain.priors, **{name: width for names in own.values() for name in names}},
+        {**plain.log_odds, **dict.fromkeys(own, math.log(PRIOR_ODDS["event"]))},
+    )
+
+
+def least_error(setting: Search, models: Sequence[FittedModel]) -> float:
+    """What an independent sample may be off by, SI, given what the best of `models` leaves: all are compared with that."""
+    best = min(models, key=lambda model: model.rms)
+    return independent_error(best, float(setting.problem.noise_sigma), setting.noise_given)
+
+
+def first_places(
+    search: Search, joint: JointParameters, chosen: Sequence[Score], values: np.ndarray
+) -> dict[str, list[np.ndarray]]:
+    """Where fits of each chosen term begin, parameters (P,).
+
+    At zero, where a fit cannot end worse than the model without it, and some way towards what the score test says, because a
+    run whose transformation begins elsewhere lies in another local minimum.
+    """
+    config, places = search.config, {}
+    for score in chosen:
+        ahead = np.array(values)
+        for name, size in score.coefficients.items():
+            ahead[joint.slots[name]] = np.clip(
+                config.term_start_share * size, -config.term_start_limit, config.term_start_limit
+            )
+        places[score.effects[0]] = [values, ahead]
+    return places
+
+
+def fitted_terms(
+    search: Search,
+    joint: JointParameters,
+    effects: tuple[str, ...],
+    places: Mapping[str, Sequence[np.ndarray]],
+    error: float,
+) -> list[FittedModel]:
+    """Every term fitted together with the parameters of the model with `effects`, from the best of its places."""
+    settings = comparison_settings(FitSettings(cache=search.cache, progress=search.progress), "fitting unknown terms")
+    groups = []
+    for program, terms in programs_of_terms(joint, effects, list(places)):
+        problem, index = joint.restricted(program)
+        begun = nearest(problem.with_noise(error), [places[term] for term in terms], index)
+        groups.append((program, [((*effects, term), at) for term, at in zip(terms, begun, strict=True)]))
+    fits = fits_by_program(joint, groups, error, settings)
+    return [fitted_model(joint, own, values, program) for own, program, values, _ in fits]
+
+
+def programs_of_terms(
+    joint: JointParameters, effects: tuple[str, ...], terms: Sequence[str]
+) -> list[tuple[tuple[str, ...], list[str]]]:
+    """(effects and terms that a program carries, terms that are fitted in it).
+
+    The program of all terms is there, from the screening. A run of it computes all of them; where there is much to compute, one
+    for each term is soon worth its three seconds.
+    """
+    directions = max(len(joint.free((*effects, term))) for term in terms)
+    if directions * float(np.asarray(joint.problem.batch.mask).sum()) < MUCH:
+        return [(tuple(joint.coefficients), list(terms))]
+    return [((*effects, term), [term]) for term in terms]
