@@ -339,11 +339,18 @@ def as_model(search: JointSearch, fitted: FittedModel, error: float) -> Model:
 
 
 def _needed(search: JointSearch, effect: str, model: FittedModel, error: float) -> float:
-    """Log evidence of `model` over the likeliest fitted one without `effect`: of its own effects, where any was fitted."""
+    """Log evidence of `model` over the likeliest fitted one without `effect`: of its own effects, where any was fitted.
+
+    Else half of the square by which its coefficients are off their base values, in posterior standard deviations together.
+    """
     rest = tuple(name for name in model.effects if name != effect)
-    if rest not in search.fitted:
-        return np.inf  # the linear model is certain of it
-    return model.log_evidence(error**2) - search.fitted[rest].log_evidence(error**2)
+    if rest in search.fitted:
+        return model.log_evidence(error**2) - search.fitted[rest].log_evidence(error**2)
+    joint = search.joint
+    own = [model.names.index(name) for name in joint.coefficients[effect]]
+    off = np.asarray([joint.deviation(model.names[k], float(model.values[joint.slots[model.names[k]]])) for k in own])
+    covariance = model.covariance(error**2)[np.ix_(own, own)]
+    return float(0.5 * off @ np.linalg.lstsq(covariance, off, rcond=None)[0])
 
 
 def _joined(effects: Sequence[str]) -> str:

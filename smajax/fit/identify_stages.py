@@ -135,7 +135,8 @@ def check_identifiability(setup: Setup, options: Options) -> Checks:
     """
     values = _full_values(setup.every_run, setup.problem, setup.problem.start_values())
     at = _of_fit_runs(sensitivity(setup.every_run, values, setup.names), setup)
-    held = tuple(values_not_given(setup.experiment, setup.problem.system)[0])
+    not_given = values_not_given(setup.experiment, setup.problem.system)[0]
+    held = tuple(name for name in not_given if name not in setup.names)  # one with a base in the file may be fitted
     declared = setup.experiment.priors
     widths_alone = held and any(one.base is None for one in declared.presets.values())
     unused = bool(declared.odds or declared.coefficients or widths_alone)

@@ -324,6 +324,9 @@ def test_a_value_that_the_file_does_not_give_may_be_fitted_too(tmp_path: Path, m
     preset = parameter_values(build("flexinol_table_3_2", "coupon", "none"))["stress_slope_austenite"]
     monkeypatch.setitem(TRUTH, "stress_slope_austenite", 0.88 * preset)
     file = coupon_file(tmp_path, NOISE)
+    # One with a base of its own in the file is fitted too, and no longer held.
+    own = 'young_modulus_austenite = { base = "75 GPa", relative = 0.1 }'
+    file.write_text(f"{file.read_text(encoding='utf-8')}\n[priors.presets]\n{own}\n", encoding="utf-8")
     records = {
         how: json.loads(
             smajax("identify", file, "--starts", "0", "--presets", how, "--out", tmp_path / how, "--json").out
