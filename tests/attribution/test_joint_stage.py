@@ -16,6 +16,7 @@ from smajax.attribution.close_loop import close_loop, prepared
 from smajax.attribution.config import AttributionConfig
 from smajax.attribution.findings import Findings, LikelierModel, StepDependent
 from smajax.attribution.joint_stage import search_by_evidence
+from smajax.attribution.laplace_evidence import fitted_model
 from smajax.attribution.unknown.search import AskedFor, Lacking
 from smajax.core.progress import quiet
 from smajax.core.result_cache import ResultCache
@@ -27,6 +28,7 @@ from smajax.model.effects.library import LIBRARY
 from smajax.report.html import findings_to_html
 from smajax.report.json_file import findings_to_json
 from smajax.report.narrative import narrate
+from tests.helpers.hot_weight import NOISE, hot_weight
 
 FEW = ("latent_heat", "sensor_gain", "radiation")
 
@@ -197,3 +199,15 @@ def test_with_a_finer_integration_the_search_goes_on_from_the_likeliest_models(m
     assert starts[()] is base.values
     # What is not free now lies where the base model has it.
     assert [values.tolist() for effects, values in starts.items() if effects] == [[0.0, 1.0, 0.0]] * 2
+
+
+def test_effects_stand_by_how_much_the_model_needs_them_even_where_it_was_never_fitted_without() -> None:
+    """An unfinished page is of such a model; in the library the latent heat stands before the contrast of the resistances."""
+    truth = {"latent_heat.enthalpy": 200.0, "phase_resistance.contrast": -0.2}
+    search = hot_weight(truth)
+    values = search.joint.problem.start_values()
+    for name, value in truth.items():
+        values[search.joint.slots[name]] = value
+    effects = ("latent_heat", "phase_resistance")
+    search.fitted[effects] = fitted_model(search.joint, effects, values, effects)
+    assert joint_stage.as_model(search, search.fitted[effects], NOISE).effects == effects[::-1]
