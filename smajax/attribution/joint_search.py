@@ -186,12 +186,17 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
 
 def _noted(search: JointSearch, present: FittedModel, other: FittedModel) -> FittedModel:
     """`other`, which is likelier than `present` at the error that it leaves itself, as what a round ended with."""
-    error = search.error(other)
-    gain = other.log_evidence(error**2) - present.log_evidence(error**2)
+    error, gain = search.error(other), _gain(search, present, other)
     done = JointRound(error, present.effects, ((other.effects, gain, other.rms),), other.effects, gain)
     search.rounds.append(done)
     search.on_round(done)
     return other
+
+
+def _gain(search: JointSearch, present: FittedModel, other: FittedModel) -> float:
+    """Log evidence of `other` over that of `present`, at the error that `other` leaves itself."""
+    variance = search.error(other) ** 2
+    return other.log_evidence(variance) - present.log_evidence(variance)
 
 
 def _effects(search: JointSearch, subset: Subset) -> tuple[str, ...]:
@@ -204,11 +209,16 @@ def _linear(search: JointSearch, present: FittedModel, error: float) -> tuple[Li
     if not search.detectable:
         found = detectable(search.joint, traces, search.noise)
         search.detectable = tuple(effect for effect in found if effect not in search.excluded)
+    return _climbed(search, present, traces, error), traces
+
+
+def _climbed(search: JointSearch, present: FittedModel, traces: Traces, error: float) -> LinearModel:
+    """The linear model at `traces`, searched from no effects and from those of `present`; `error` of an independent sample, SI."""
     linear = linear_model(search.joint, traces, error**2, search.detectable)
     here: Subset = frozenset(Variant(effect, -1) for effect in present.effects)
     for start in {frozenset(), here}:
         linear.climb(start)
-    return linear, traces
+    return linear
 
 
 def _promising(search: JointSearch, linear: LinearModel, present: FittedModel, error: float) -> list[Subset]:
@@ -278,10 +288,7 @@ def _several_at_once(
     if error < UNEXPLAINED * search.noise or len(present.effects) >= MANY:
         return None
     level = float(np.sqrt(error * search.noise))
-    linear = linear_model(search.joint, traces, level**2, search.detectable)
-    here: Subset = frozenset(Variant(effect, -1) for effect in present.effects)
-    for start in {frozenset(), here}:
-        linear.climb(start)
+    linear = _climbed(search, present, traces, level)
     sets: dict[tuple[str, ...], Subset] = {}
     for subset in linear.ranked()[:REACHED]:
         effects = _effects(search, subset)
@@ -291,25 +298,20 @@ def _several_at_once(
         return None
     _fit(search, list(sets.values())[:AT_ONCE], linear, traces, level, number)
     fitted = [search.fitted[effects] for effects in sets if effects in search.fitted]
-
-    def ahead(model: FittedModel) -> float:
-        variance = search.error(model) ** 2
-        return model.log_evidence(variance) - present.log_evidence(variance)
-
     better = [one for one in fitted if one.rms < UNEXPLAINED * search.noise and search.error(one) < error]
-    best = max(better, key=ahead, default=None)
-    return best if best is not None and ahead(best) > SETTLED_ODDS else None
+    best = max(better, key=lambda one: _gain(search, present, one), default=None)
+    return best if best is not None and _gain(search, present, best) > SETTLED_ODDS else None
 
 
 def fitted_alone(search: JointSearch, effects: Sequence[str], error: float) -> list[FittedModel]:
     """The base model with one of `effects` each, of those that the runs can show; `error` of an independent sample, SI."""
-    linear, traces = _linear(search, search.fitted[()], error)
-    places: dict[str, Variant] = {}
-    for one in sorted(linear.places, key=lambda one: linear.log_evidence(frozenset({one}))):
-        places[one.effect] = one  # the likeliest
-    sets = [frozenset({places[effect]}) for effect in effects if effect in places and (effect,) not in search.fitted]
-    if sets:
-        _fit(search, sets, linear, traces, error, len(search.rounds))
+    fresh = [effect for effect in effects if effect in search.detectable and (effect,) not in search.fitted]
+    if fresh:
+        linear, traces = _linear(search, search.fitted[()], error)
+        places: dict[str, Variant] = {}
+        for one in sorted(linear.places, key=lambda one: linear.log_evidence(frozenset({one}))):
+            places[one.effect] = one  # the likeliest
+        _fit(search, [frozenset({places[effect]}) for effect in fresh], linear, traces, error, len(search.rounds))
     return [search.fitted[effect,] for effect in effects if (effect,) in search.fitted]
 
 

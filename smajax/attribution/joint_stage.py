@@ -34,9 +34,6 @@ from smajax.model.effects.prior_width import CoefficientPrior
 
 LIKELIEST = 4  # sets of effects from which the search goes on with the values of presets free
 FREED_SHARE = 2.0 / 3.0  # of the base error, to which free values of presets lower it where the search begins so
-STAND_INS = (
-    3  # effects that leave more than noise: from here on one unknown function that leaves only noise ends a search
-)
 SETTLED_COST = 1e-4  # of twice the log-likelihood: the optimum to within a hundredth of a standard error
 
 

@@ -15,7 +15,7 @@ import jax.numpy as jnp
 from jax import lax
 
 from smajax.core.where_tree import where_tree
-from smajax.model.drive.inputs import switched
+from smajax.model.drive.inputs import BEFORE, switched
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System, prepared
 from smajax.model.types import Inputs, Scalar, State
@@ -135,7 +135,7 @@ class CouponSubsteps(eqx.Module):
         if share is not None and turn is not None:
             # What acts late is given where it turns; the others are on their way.
             on_the_way = {name: before[name] + share * (end[name] - before[name]) for name in end}
-            there = {name: turn[name] if turn[name] is not end[name] else on_the_way[name] for name in end}
+            there = {name: turn[name] if BEFORE + name in inputs else on_the_way[name] for name in end}
             # No part without length: a lag of the sensor divides by it.
             first = jnp.clip(share, SHORTEST_PART, 1.0 - SHORTEST_PART)
             corners, parts = [before, there, end], [first, 1.0 - first]

@@ -6,10 +6,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
-from scipy import stats
 
 from smajax.core.files import replace
 from studies.attribution_benchmark.judge import EQUATIONS, NOTHING, OUTSIDE, Judged, called
+from studies.attribution_benchmark.reliability import interval
 
 STRENGTHS = (1.0, 3.0, 10.0)
 REACHED = 0.8  # of the strength asked for: a case that comes to less is counted where it comes to
@@ -81,7 +81,7 @@ def bars(cases: Sequence[Judged]) -> list[tuple[str, str, str]]:
 def most_alarms(nulls: Sequence[Judged]) -> float:
     """Upper end of the 95 % interval of the rate of false alarms (Clopper and Pearson 1934)."""
     alarms = sum(one.verdict != "adequate" for one in nulls)
-    return float(stats.beta.ppf(0.975, alarms + 1, len(nulls) - alarms)) if alarms < len(nulls) else 1.0
+    return interval(alarms, len(nulls))[1]
 
 
 def precision(cases: Sequence[Judged]) -> str:

@@ -21,7 +21,7 @@ from smajax.attribution.laplace_evidence import FittedModel, fitted_model
 from smajax.attribution.leave_one_run_out import predicting
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.paired_errors import compared, pooled_rms
-from smajax.attribution.unknown.explained_share import EXPLAINED
+from smajax.attribution.unknown.explained_share import EXPLAINED, explained_share
 from smajax.attribution.unknown.ranges import Sought
 from smajax.attribution.unknown.spline import design
 from smajax.attribution.unknown.term_fits import (
@@ -120,12 +120,8 @@ def _less(with_it: float | None, without: float) -> bool:
 
 
 def _explains(with_it: float, without: float, noise: float) -> bool:
-    """Whether a function takes away `EXPLAINED` of the squares that the error on runs left out has beyond the noise (`explained_share`); root mean squares, SI."""
-    return (
-        without > noise
-        and _less(with_it, without)
-        and with_it**2 - noise**2 <= (1.0 - EXPLAINED) * (without**2 - noise**2)
-    )
+    """Whether a function takes away `EXPLAINED` of the squares that the error on runs left out has beyond the noise; root mean squares, SI."""
+    return explained_share(with_it, without, noise) >= EXPLAINED
 
 
 def asked_for(setting: Search, model: Model | FittedModel) -> AskedFor:

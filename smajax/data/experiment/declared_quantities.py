@@ -29,14 +29,19 @@ def ambient_of(read: ReadRun, scale: Scale) -> float:
     return read.run.parameters.get("ambient_temperature", scale.ambient)
 
 
+def lagging(values: np.ndarray, step: float, time_constant: float) -> np.ndarray:
+    """`values` (n,), `step` apart, as what follows them with that time constant shows them, from zero; both s."""
+    share = 1.0 - np.exp(-step / time_constant)
+    return np.asarray(scipy.signal.lfilter([share], [1.0, share - 1.0], values))
+
+
 def warmings(runs: Sequence[ReadRun], scale: Scale, heats: Sequence[str], step: float) -> list[np.ndarray]:
     """By run, (n,): the degrees above the air of a wire that follows its heat through the time constant of its temperature; none where a heat is not recorded."""
-    share = 1.0 - np.exp(-step / scale.time_constant)
     result = []
     for read in runs:
         given = {name: read.run.inputs[name] for name in heats if name in read.run.inputs}
         warm = scale.warming(given) if heats and len(given) == len(heats) else np.zeros(0)
-        result.append(scipy.signal.lfilter([share], [1.0, share - 1.0], warm))
+        result.append(lagging(warm, step, scale.time_constant))
     return result
 
 

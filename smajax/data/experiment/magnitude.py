@@ -10,7 +10,7 @@ import scipy  # its parts are imported when they are first used
 
 from smajax.data.experiment.catalogue import Scale
 from smajax.data.experiment.column_guess import in_levels
-from smajax.data.experiment.declared_quantities import quantity_warnings
+from smajax.data.experiment.declared_quantities import lagging, quantity_warnings
 from smajax.data.experiment.signals import ReadRun
 from smajax.data.readers.table import Array
 
@@ -156,7 +156,6 @@ def _following(
     Heat is the power through some time constants of the wire; what follows it rises and falls with it, by whatever curve.
     """
     following: dict[str, Sequence[Array]] = {}
-    shares = [1.0 - np.exp(-step / (lag * scale.time_constant)) for lag in LAGS]
     for name in runs[0].run.outputs:
         result = []
         for read in runs:
@@ -166,7 +165,7 @@ def _following(
             if len(given) < len(heats) or there.sum() < LEAST or np.ptp(output[there]) == 0.0:
                 continue
             power = scale.warming(given)
-            warm = [scipy.signal.lfilter([share], [1.0, share - 1.0], power)[there] for share in shares]
+            warm = [lagging(power, step, lag * scale.time_constant)[there] for lag in LAGS]
             if np.ptp(warm[0]) > 0.0:
                 result.append(np.asarray([scipy.stats.spearmanr(one, output[there]).statistic for one in warm]))
         if result:
