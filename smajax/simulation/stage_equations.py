@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool
 
 from smajax.model.load.base import AbstractMovingLoad
-from smajax.model.load.friction import in_use, rubbing
+from smajax.model.load.friction import holding, rubbing
 from smajax.model.system import System, ambient_temperature, heating_power, load_resistance
 from smajax.model.types import Inputs, Scalar, State
 from smajax.model.wire.constitutive import stress_at
@@ -33,6 +33,7 @@ class Stage(eqx.Module):
 
     old: State
     time: Scalar
+    elapsed: Scalar  # since the state before it, s: a difference of times would be rounded
     step: Scalar  # g = gamma dt, s
     heat: Scalar  # H_b, J/m
     position: Scalar  # x_b
@@ -66,7 +67,7 @@ def _free_displacement(system: System, stage: Stage, inputs: Inputs, z: Unknowns
     inertia = load.inertia(inputs)
     before = stage.old.motion
     friction = sum(
-        one.limit * in_use(one, before, position)
+        one.limit * holding(one, before, position, velocity, stage.elapsed)
         for one in rubbing(load, system.terms.friction, before, stage.velocity, inputs)
     )
     pull = load.lever() * cross_section(system.wire) * z.stress

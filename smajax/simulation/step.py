@@ -18,6 +18,7 @@ implicit function theorem: of any order in forward mode, of the first two where 
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Callable
 from typing import NamedTuple, TypeVar
 
@@ -185,20 +186,23 @@ def _moving_step(
     )
 
     def body(carry: _Bases, now: tuple[Scalar, ...]) -> tuple[_Bases, None]:
-        ends, moved, later_moved, compared = now
+        ends, elapsed, moved, later_moved, compared = now
         new, *slopes = _stage(system, carry.stage, inputs)
         bases = [base + moved * slope for base, slope in zip(carry.later, slopes, strict=True)]
         later = [base + later_moved * slope for base, slope in zip(carry.later, slopes, strict=True)]
         error = [total + compared * slope for total, slope in zip(carry.error, slopes, strict=True)]
-        return _Bases(Stage(new, ends, carry.stage.step, *bases, scheme.enough, once), later, error), None
+        return _Bases(Stage(new, ends, elapsed, carry.stage.step, *bases, scheme.enough, once), later, error), None
 
     gamma = scheme.gamma * dt
-    first = Stage(state, state.time + scheme.ends[0] * dt, gamma, *start, scheme.enough, once)
-    # The time scanned over is that at which the *next* stage ends.
-    times = jnp.stack([state.time + share * dt for share in (*scheme.ends[1:], 1.0)])
+    to_first = scheme.ends[0] * dt
+    first = Stage(state, state.time + to_first, to_first, gamma, *start, scheme.enough, once)
+    # The times scanned over are those of the *next* stage: its end, and from that of the one before.
+    ends = (*scheme.ends, 1.0)
+    times = jnp.stack([state.time + share * dt for share in ends[1:]])
+    elapsed = jnp.stack([(share - before) * dt for before, share in itertools.pairwise(ends)])
     shares = [jnp.stack([share * dt for share in row]) for row in (scheme.moved, scheme.later_moved, scheme.compared)]
     none = [0.0 * one for one in start]  # with a derivative, as in `simulate`
-    end, _ = lax.scan(recomputed(body), _Bases(first, list(start), none), (times, *shares))
+    end, _ = lax.scan(recomputed(body), _Bases(first, list(start), none), (times, elapsed, *shares))
     old = end.stage.old
     heat, position, velocity = end.error
     return dataclasses.replace(old, time=end.stage.time), (heat, position, velocity)
