@@ -45,13 +45,15 @@ class _Run(eqx.Module):
 
 def _runs(problem: Problem) -> list[_Run]:
     batch = problem.batch
-    dt = jnp.asarray(batch.dt, dtype=float)
+    # numpy's arrays: of JAX's each index is a program of its own, which takes longer than a short run.
+    inputs = {name: np.asarray(series) for name, series in batch.inputs.items()}
+    overrides, dt = np.asarray(batch.overrides), np.asarray(batch.dt, dtype=float)
     names = problem.shared, batch.override_names, problem.per_run.names, batch.outputs
     return [
         _Run(
             problem.system,
-            {name: series[run] for name, series in batch.inputs.items()},
-            batch.overrides[run],
+            {name: series[run] for name, series in inputs.items()},
+            overrides[run],
             dt,
             *names,
             batch.integration,

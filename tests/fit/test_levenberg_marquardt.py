@@ -26,13 +26,13 @@ from smajax.fit.levenberg_marquardt import (
     TOLERANCE,
     FitSettings,
     LMState,
-    NormalEquations,
     Status,
     _advanced,
     _best_of_each,
     _initial_state,
     _without_exceeding,
 )
+from smajax.fit.normal_equations import NormalEquations
 from smajax.fit.problem import FitTask
 from smajax.fit.robust import robust_variance
 from smajax.fit.sensitivity import Sensitivity

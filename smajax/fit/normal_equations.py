@@ -1,0 +1,70 @@
+"""Cost of fits at points, and with derivatives their normal equations: of many fits at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from smajax.fit.outputs_of_runs import predicted_and_derivatives, predicted_at
+from smajax.fit.problem import FitTask, Problem
+
+NormalEquations = tuple[float, np.ndarray, np.ndarray]  # r^T r, J^T r, J^T J of one fit, by shares of its range
+
+
+def _weight(problem: Problem, task: FitTask) -> np.ndarray:
+    """Of the misfits of every series, (series, 1)."""
+    return np.repeat(np.sqrt(task.weights), len(problem.batch.outputs))[:, None] / np.asarray(problem.noise)
+
+
+def _residual(
+    problem: Problem, task: FitTask, y: np.ndarray, point: np.ndarray, predicted: np.ndarray, measured: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """(misfits over the noise, priors and regularisation of a task at its y, (m,); root mean square misfit on each series, SI)."""
+    weight = _weight(problem, task)
+    samples = (np.asarray(problem.batch.mask) > 0.0).sum(axis=1)
+    with np.errstate(
+        over="ignore", invalid="ignore", divide="ignore"
+    ):  # a step to where a load jumps: it will be rejected
+        residual = weight * problem.centred(measured - predicted)
+        # nan of a run without weight
+        misfit = np.sqrt(np.sum((residual / weight) ** 2, axis=1) / samples) / problem.scale_of_series[:, 0]
+    drift = task.regularisation * (y - task.initial_guess)
+    return np.concatenate([residual.ravel(), problem.priors.rows(point), drift]), misfit
+
+
+def costs(
+    problem: Problem, tasks: Sequence[FitTask], ys: Sequence[np.ndarray], outputs: np.ndarray | None
+) -> list[float]:
+    """r^T r of every task at its y."""
+    points = np.stack([task.values_at(y) for task, y in zip(tasks, ys, strict=True)])
+    measured = [problem.measured] * len(tasks) if outputs is None else outputs
+    found = []
+    for one in zip(tasks, ys, points, predicted_at(problem, points), measured, strict=True):
+        value, _ = _residual(problem, *one)
+        with np.errstate(over="ignore", invalid="ignore"):
+            found.append(float(value @ value))
+    return found
+
+
+def normal_equations(
+    problem: Problem, tasks: Sequence[FitTask], ys: Sequence[np.ndarray], outputs: np.ndarray | None
+) -> list[tuple[NormalEquations, np.ndarray]]:
+    """Of every task at its y, with its root mean square misfit on each series, SI. Directions of all tasks go side by side, whatever each of them frees."""
+    points = np.stack([task.values_at(y) for task, y in zip(tasks, ys, strict=True)])
+    most = max(1, *(len(task.slots) for task in tasks))
+    tangents = np.zeros((len(tasks), most, points.shape[1]))
+    for rows, task in zip(tangents, tasks, strict=True):
+        rows[np.arange(len(task.slots)), task.slots] = task.high - task.low
+    predicted, derivatives = predicted_and_derivatives(problem, points, tangents)
+    measured = [problem.measured] * len(tasks) if outputs is None else outputs
+    equations = []
+    for k, (task, y) in enumerate(zip(tasks, ys, strict=True)):
+        value, misfit = _residual(problem, task, y, points[k], predicted[k], measured[k])
+        jacobian = -_weight(problem, task) * problem.centred(derivatives[k, : len(task.slots)])
+        prior = problem.priors.slopes(points[k])[:, task.slots] * (task.high - task.low)
+        columns = jacobian.reshape(len(task.slots), -1), prior.T, np.diag(task.regularisation)
+        rows = np.concatenate(columns, axis=1)
+        with np.errstate(over="ignore", invalid="ignore"):
+            equations.append(((float(value @ value), rows @ value, rows @ rows.T), misfit))
+    return equations
