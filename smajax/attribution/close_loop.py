@@ -180,11 +180,9 @@ def prepared(  # the stage's inputs, each once
     if integration is None:
         report_warnings(progress, experiment.warnings)
     base = setting.base(start, seed)
-    if integration is None:
-        # It was chosen where the fit begins, at which the wire may not even move. Now, and not when the whole search has been made with it.
-        finer = finer_integration(setting, (), base.values)
-        if finer is not None:
-            return prepared(experiment, cache, progress, seed, config, interim, finer)
+    # It was chosen where the fit begins, at which the wire may not even move. Now, and not when the whole search has been made with it.
+    if integration is None and (finer := finer_integration(setting, (), base.values)) is not None:
+        return prepared(experiment, cache, progress, seed, config, interim, finer)
     progress(Stage(CHECKING, 0.0))
     problem, index = setting.restricted(())
     at_fit = sensitivity(problem, base.values[np.asarray(index)], [*job.unknowns, *job.presets])
@@ -218,10 +216,11 @@ def searched_finely(context: Context) -> tuple[Context, Outcome]:
     """The search; where the model that it ends with asks for a finer integration, on from its likeliest models with that."""
     setting = context.setting
     outcome = Outcome(*search_by_evidence(setting, context.base))
-    if (finer := finer_integration(setting, outcome.final.effects, outcome.final.values)) is None:
+    finer = finer_integration(setting, outcome.final.effects, outcome.final.values, beside_what_is_left=True)
+    if finer is None:
         return context, outcome
-    given = context.job.experiment, setting.cache, setting.progress, context.seed, setting.config
-    context = prepared(*given, context.interim, finer)
+    given = context.job.experiment, setting.cache, setting.progress, context.seed, setting.config, context.interim
+    context = prepared(*given, finer)
     context.setting.rounds += setting.rounds
     return context, Outcome(*search_again(context.setting, context.base, outcome.search))
 

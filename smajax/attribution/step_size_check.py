@@ -12,8 +12,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.model_fits import Model, Search, Start, base_value
-from smajax.fit.integration import IntegrationError, choose_integration, described, integration_error
-from smajax.fit.outputs_of_runs import predicted_at
+from smajax.fit.integration import LARGEST, MARGIN, IntegrationError, choose_integration, described, integration_error
+from smajax.fit.outputs_of_runs import misfits, predicted_at
 from smajax.fit.packed_runs import RunBatch, halved
 from smajax.fit.problem import Problem
 from smajax.model.effects.library import LIBRARY
@@ -64,20 +64,32 @@ def _at(problem: Problem, values: np.ndarray) -> tuple[System, np.ndarray]:
     return problem.system_at(here), np.asarray(problem.per_run_at(here))
 
 
+def _left(problem: Problem, values: np.ndarray) -> float:
+    """Root mean square that a model with `values` (P,) leaves, in noises, on the run and output of which it leaves least; 1 where that is less."""
+    (misfit,), mask = misfits(problem, [values]), np.asarray(problem.batch.mask) > 0.0
+    rms = np.sqrt((np.asarray(misfit) ** 2).sum(axis=1) / np.maximum(mask.sum(axis=1), 1))[mask.any(axis=1)]
+    return max(1.0, float((rms / np.asarray(problem.noise)[mask.any(axis=1), 0]).min()))
+
+
 def integration_error_of(setting: Search, final: Model) -> IntegrationError:
-    """What the integration leaves in the output of the final model on the fit runs."""
+    """What the integration leaves in the output of the final model on the fit runs; small is a tenth of what the model leaves itself."""
     problem, index = setting.restricted(final.effects)
-    return integration_error(problem, *_at(problem, final.values[index]))
+    values = final.values[np.asarray(index)]
+    found = integration_error(problem, *_at(problem, values))
+    return dataclasses.replace(found, limit=LARGEST * _left(problem, values))
 
 
-def finer_integration(setting: Search, effects: tuple[str, ...], values: np.ndarray) -> Integration | None:
+def finer_integration(
+    setting: Search, effects: tuple[str, ...], values: np.ndarray, beside_what_is_left: bool = False
+) -> Integration | None:
     """The integration that a model with these values (P,) asks for, where the present one leaves more than a tenth of the noise on the fit runs.
 
-    None where it does not, or where none leaves less.
+    None where it does not, or where none leaves less. `beside_what_is_left`: a tenth of what the model itself leaves in every run and output, where that is more than the noise.
     """
     problem, index = setting.restricted(effects)
-    here = _at(problem, values[np.asarray(index)])
-    if integration_error(problem, *here).small:
+    own = values[np.asarray(index)]
+    level = _left(problem, own) if beside_what_is_left else 1.0
+    if integration_error(problem, *_at(problem, own)).share <= LARGEST * level:
         return None
-    finer = choose_integration(problem, *here)
+    finer = choose_integration(problem, *_at(problem, own), MARGIN * LARGEST * level)
     return None if described(finer) == described(problem.batch.integration) else finer
