@@ -88,8 +88,8 @@ def finer_integration(
     """
     problem, index = setting.restricted(effects)
     own = values[np.asarray(index)]
-    level = _left(problem, own) if beside_what_is_left else 1.0
-    if integration_error(problem, *_at(problem, own)).share <= LARGEST * level:
+    here, level = _at(problem, own), _left(problem, own) if beside_what_is_left else 1.0
+    if integration_error(problem, *here).share <= LARGEST * level:
         return None
-    finer = choose_integration(problem, *_at(problem, own), MARGIN * LARGEST * level)
+    finer = choose_integration(problem, *here, MARGIN * LARGEST * level)
     return None if described(finer) == described(problem.batch.integration) else finer

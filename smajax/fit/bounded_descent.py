@@ -22,9 +22,8 @@ import jax.numpy as jnp
 import optimistix as optx
 from jaxtyping import Array, Bool, Float
 
-INITIAL_DAMPING = (
-    1e-5  # share of the squared columns: nearly the whole step of Gauss and Newton, for a rejected one costs little
-)
+# Share of the squared columns: nearly the whole step of Gauss and Newton, for a rejected one costs little.
+INITIAL_DAMPING = 1e-5
 FRACTION_TO_BOUND = 0.7  # a step goes at most this share of the way to a bound
 NEAR_BOUND = 1e-3  # of the range: from here on the bound itself may be reached
 MIN_SCALE = 1e-14  # of the largest squared column, for a parameter on which nothing depends

@@ -19,18 +19,21 @@ def _weight(problem: Problem, task: FitTask) -> np.ndarray:
 
 def _residual(
     problem: Problem, task: FitTask, y: np.ndarray, point: np.ndarray, predicted: np.ndarray, measured: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """(misfits over the noise, priors and regularisation of a task at its y, (m,); root mean square misfit on each series, SI)."""
-    weight = _weight(problem, task)
-    samples = (np.asarray(problem.batch.mask) > 0.0).sum(axis=1)
-    with np.errstate(
-        over="ignore", invalid="ignore", divide="ignore"
-    ):  # a step to where a load jumps: it will be rejected
-        residual = weight * problem.centred(measured - predicted)
-        # nan of a run without weight
-        misfit = np.sqrt(np.sum((residual / weight) ** 2, axis=1) / samples) / problem.scale_of_series[:, 0]
+) -> np.ndarray:
+    """Misfits over the noise, priors and regularisation of a task at its y, (m,)."""
+    with np.errstate(over="ignore", invalid="ignore"):  # a step to where a load jumps: it will be rejected
+        misfits = _weight(problem, task) * problem.centred(measured - predicted)
     drift = task.regularisation * (y - task.initial_guess)
-    return np.concatenate([residual.ravel(), problem.priors.rows(point), drift]), misfit
+    return np.concatenate([misfits.ravel(), problem.priors.rows(point), drift])
+
+
+def _misfit_by_series(problem: Problem, task: FitTask, residual: np.ndarray) -> np.ndarray:
+    """Root mean square misfit on each series, SI, from `_residual`; nan of a run without weight."""
+    weight, shape = _weight(problem, task), problem.measured.shape
+    samples = (np.asarray(problem.batch.mask) > 0.0).sum(axis=1)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        misfits = residual[: problem.measured.size].reshape(shape) / weight
+        return np.sqrt(np.sum(misfits**2, axis=1) / samples) / problem.scale_of_series[:, 0]
 
 
 def costs(
@@ -41,7 +44,7 @@ def costs(
     measured = [problem.measured] * len(tasks) if outputs is None else outputs
     found = []
     for one in zip(tasks, ys, points, predicted_at(problem, points), measured, strict=True):
-        value, _ = _residual(problem, *one)
+        value = _residual(problem, *one)
         with np.errstate(over="ignore", invalid="ignore"):
             found.append(float(value @ value))
     return found
@@ -60,11 +63,13 @@ def normal_equations(
     measured = [problem.measured] * len(tasks) if outputs is None else outputs
     equations = []
     for k, (task, y) in enumerate(zip(tasks, ys, strict=True)):
-        value, misfit = _residual(problem, task, y, points[k], predicted[k], measured[k])
+        value = _residual(problem, task, y, points[k], predicted[k], measured[k])
         jacobian = -_weight(problem, task) * problem.centred(derivatives[k, : len(task.slots)])
         prior = problem.priors.slopes(points[k])[:, task.slots] * (task.high - task.low)
         columns = jacobian.reshape(len(task.slots), -1), prior.T, np.diag(task.regularisation)
         rows = np.concatenate(columns, axis=1)
         with np.errstate(over="ignore", invalid="ignore"):
-            equations.append(((float(value @ value), rows @ value, rows @ rows.T), misfit))
+            equations.append(
+                ((float(value @ value), rows @ value, rows @ rows.T), _misfit_by_series(problem, task, value))
+            )
     return equations

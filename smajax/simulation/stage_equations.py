@@ -48,7 +48,7 @@ def _heating(system: System, stage: Stage, inputs: Inputs, temperature: Scalar, 
     power = heating_power(system, ohms, inputs, old.wire)
     ambient = ambient_temperature(system, stage.time, inputs)
     # What changes over a stage counts from the state before it: a later stage of a step is longer than its own base.
-    at = HeatState(temperature, ambient, fraction, stage.time, old.wire, stage.time - old.time)
+    at = HeatState(temperature, ambient, fraction, stage.time, old.wire, stage.elapsed)
     return heat_rate(wire, terms.heat, at, power)
 
 

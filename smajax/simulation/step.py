@@ -147,7 +147,7 @@ def _stage(system: System, stage: Stage, inputs: Inputs) -> tuple[State, Scalar,
     """One stage of a moving load: (state at its end, dH/dt, v, a)."""
     load = system.load
     assert isinstance(load, AbstractMovingLoad)
-    terms, old = system.terms, over(stage.old.wire, stage.time - stage.old.time)
+    terms, old = system.terms, over(stage.old.wire, stage.elapsed)
     stage = dataclasses.replace(stage, old=dataclasses.replace(stage.old, wire=old))
     wire, displacement, free, unsolved = _ended(system, stage, inputs)
     wire = with_supply_history(system, inputs, old, wire)

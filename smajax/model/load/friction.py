@@ -113,7 +113,8 @@ def holding(one: Rubbing, before: Motion, position: Scalar, velocity: Scalar, ti
     moved = bent(one, before, position)
     ahead = jnp.where(moved < 0.0, -velocity, velocity) / one.presliding
     speed = jnp.clip(ahead, 0.0, 2.0 * jnp.abs(moved) / time)
-    return in_use(one, before, position) + one.relaxation * speed * yet_to_bend(one, before, position) / one.level
+    rest = yet_to_bend(one, before, position)
+    return slipping(one, before, position) - rest + one.relaxation * speed * rest / one.level
 
 
 def unbent(one: Rubbing, before: Motion) -> Scalar:
