@@ -61,12 +61,9 @@ NoiseOfSweep = Annotated[
         "of a length what the same strain of the wire moves; none of the true state",
     ),
 ]
-Quantum = Annotated[
-    str,
-    typer.Option(
-        help="step between two values of the readings, 0.1deg or 20um, without a unit in deg, or in mm of a length; default as the noise, none where a noise is given"
-    ),
-]
+STEPS = "step between two values of the readings, 0.1deg or 20um, without a unit in deg, or in mm of a length; default"
+Quantum = Annotated[str, typer.Option(help=f"{STEPS} none")]
+QuantumOfSweep = Annotated[str, typer.Option("--quantum", help=f"{STEPS} as the noise, none where a noise is given")]
 
 
 def noise_option(text: str, unit: PositionUnit, option: str = "--noise") -> float | None:

@@ -24,6 +24,7 @@ def loop_around(
     *,
     estimator: str | AbstractEstimator | None = None,
     noise: float | str = 0.0,
+    quantum: float | str = 0.0,
     delay: int = 0,
     assumed: System | None = None,
 ) -> Loop:
@@ -32,7 +33,7 @@ def loop_around(
     controller: the name of one in `CONTROLLERS`, or one of one's own. gains: by name, SI or text with a unit (`"900 V/m"`), a
     file of `smajax tune`, or none: those of the arm, scaled to this plant (`control.scales`); gains that are not named keep
     that value. estimator: the name of a filter, or one of one's own; none: the true state. noise: standard deviation of the
-    reading, rad or m, or text (`"20 um"`). delay: control periods until a command arrives. assumed: the plant that
+    reading, rad or m, or text (`"20 um"`). quantum: step between two readings, likewise; 0: none. delay: control periods until a command arrives. assumed: the plant that
     controller and filter know; by default the system itself.
 
     Raises KeyError for a controller or filter there is not, GainsFileError for a file that cannot be used, UnitError for a
@@ -41,8 +42,8 @@ def loop_around(
     """
     believed = system if assumed is None else assumed
     own = moving_load(system).reading[1]
-    sigma = parse_quantity(noise, own, bare=own)
-    sensor = Sensor(noise_sigma=sigma) if sigma else None
+    sigma, steps = (parse_quantity(one, own, bare=own) for one in (noise, quantum))
+    sensor = Sensor(noise_sigma=sigma, quantum=steps) if sigma or steps else None
     filtered = _filter(believed, estimator)
     if isinstance(controller, AbstractController):
         if gains is not None:

@@ -1,4 +1,4 @@
-"""What gains were tuned with beside the model: limit of the command, control period, delay, filter, noise of the sensor."""
+"""What gains were tuned with beside the model: limit of the command, control period, delay, filter, noise and steps of the sensor."""
 
 from __future__ import annotations
 
@@ -20,13 +20,16 @@ LIMIT_PARAMETER = "amplifier_limit"  # of a drive whose command has one
 
 @dataclass(frozen=True)
 class LoopSettings:
-    """Each None where it is not known; command_limit in `command_unit`, noise (standard deviation) in `position_unit`."""
+    """Each None where it is not known; command_limit in `command_unit`, noise (standard deviation) and quantum (step between two readings) in
+    `position_unit`.
+    """
 
     command_limit: float | None = None  # None too: a drive without a limit
     period: float | None = None  # s
     delay: int | None = None  # control periods until a command arrives
     estimator: str | None = None  # the filter; "": the true state
     noise: float | None = None
+    quantum: float | None = None  # None too: no steps
     command_unit: str = "V"
     position_unit: str = "m"
 
@@ -38,6 +41,7 @@ class LoopSettings:
             "delay_periods": self.delay,
             "filter": self.estimator,
             "noise": _with_unit(self.noise, self.position_unit),
+            "quantum": _with_unit(self.quantum, self.position_unit),
         }
         return {name: one for name, one in whole.items() if one is not None}
 
@@ -61,8 +65,8 @@ class LoopInUse(NamedTuple):
 LOOP_WITHOUT_FILTER = LoopInUse()
 
 
-def settings_of(system: System, loop: LoopInUse, noise: float) -> LoopSettings:
-    """Those of a loop on this plant, whose own limit they have. noise: rad or m."""
+def settings_of(system: System, loop: LoopInUse, noise: float, quantum: float = 0.0) -> LoopSettings:
+    """Those of a loop on this plant, whose own limit they have. noise, quantum: rad or m."""
     limit = float(system.drive.largest_command())
     return LoopSettings(
         limit if math.isfinite(limit) else None,
@@ -70,6 +74,7 @@ def settings_of(system: System, loop: LoopInUse, noise: float) -> LoopSettings:
         loop.delay,
         loop.estimator,
         noise,
+        quantum or None,
         system.drive.command[1],
         moving_load(system).reading[1],
     )
@@ -79,7 +84,7 @@ def read_settings(held: Any, system: System) -> LoopSettings:
     """What `LoopSettings.record` wrote. Raises ValueError for what it cannot have written."""
     if not isinstance(held, dict):
         raise ValueError(f"`loop` must be a table such as {{'period': {{'value': 0.01, 'unit': 's'}}}}, not {held!r}.")
-    known = ("command_limit", "period", "delay_periods", "filter", "noise")
+    known = ("command_limit", "period", "delay_periods", "filter", "noise", "quantum")
     for name in held:
         if name not in known:
             raise ValueError(f"`loop` has no {name!r}{close_matches(str(name), known, 'there are')}.")
@@ -95,6 +100,7 @@ def read_settings(held: Any, system: System) -> LoopSettings:
         delay,
         estimator,
         _number("noise", held.get("noise"), position, zero=True),
+        _number("quantum", held.get("quantum"), position, zero=True) or None,
         command,
         position,
     )

@@ -44,6 +44,10 @@ class Sensor(eqx.Module):
     noise_sigma: Scalar = parameter("rad or m", 0.0, 1.0, "standard deviation of a reading", default=0.0)
     quantum: Scalar = parameter("rad or m", 0.0, 1.0, "step between two readings; 0: none", default=0.0)
 
+    def smoothed(self) -> Sensor:
+        """Without steps, whose derivative is zero; a rounding's standard deviation, quantum / sqrt(12), is added to the noise."""
+        return Sensor(jnp.sqrt(self.noise_sigma**2 + self.quantum**2 / 12.0))
+
     def reading(self, position: Scalar, noise: Scalar) -> Scalar:
         """`noise` is a standard normal number."""
         noisy = position + self.noise_sigma * noise

@@ -140,6 +140,7 @@ class LoopRequest:
     mismatch: Mapping[str, str] = field(default_factory=dict)
     estimator: str | None = None  # "": the true state
     noise: float | str | None = None  # degrees or millimetres, or text with a unit
+    quantum: float | str = 0.0  # step between two readings, as the noise; 0: none
     period: float | None = None  # s
     delay: int | None = None  # periods
     seed: int = 0
@@ -244,7 +245,7 @@ class _Assumed(NamedTuple):
     system: System
     gains: Gains
     loop: LoopInUse
-    noise: float  # of the sensor, rad or m
+    sensor: tuple[float, float]  # its noise, and the step between two readings, rad or m
     sources: tuple[Source, ...]
 
 
@@ -263,14 +264,17 @@ def _assumed(request: RunRequest, loop: LoopRequest) -> _Assumed:
     system = CONTROLLERS[gains.controller].plant(system)
     with _part("noise"):
         noise, source = _noise(request, loop, system)
-    own = settings_of(system, merged, noise)
+    with _part("quantum"):
+        unit = unit_of(system)
+        sensor = noise, float(unit.to_own(noise_of(loop.quantum, unit)))
+    own = settings_of(system, merged, *sensor)
     of_gains = (
         [PresetGains(gains.controller, not is_arm(system))]
         if loop.gains is None
         else gains_of_files({gains.controller: (gains.loop, gains.fixed)}, loop.given, own)
     )
     sources = limit, source, *of_gains
-    return _Assumed(system, gains, merged, noise, tuple(one for one in sources if one is not None))
+    return _Assumed(system, gains, merged, sensor, tuple(one for one in sources if one is not None))
 
 
 def _noise(request: RunRequest, loop: LoopRequest, system: System) -> tuple[float, NoiseOfModelFile | None]:
@@ -304,7 +308,7 @@ MEASURED = "measured_"  # before the name of a sensor: the variable of its log
 
 def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
     """The closed loop. Raises as `run_open`, and GainsFileError."""
-    assumed, gains, own, sigma, sources = _assumed(request, loop)
+    assumed, gains, own, sensor, sources = _assumed(request, loop)
     with _part("mismatch" if loop.plant is None else "plant"):
         plant = (
             with_values(assumed, loop.mismatch)
@@ -312,9 +316,10 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
             else true_plant(loop.plant, loop.mismatch, assumed, gains.controller)
         )
     unit = unit_of(assumed)
-    between = own.estimator, float(unit.of(sigma)), own.period
-    check_interface(*between, request.dt)
-    interface = interface_of(assumed, *between, request.dt, own.delay)
+    sigma, quantum = (float(unit.of(one)) for one in sensor)
+    between = own.estimator, sigma, own.period
+    check_interface(*between, request.dt, quantum)
+    interface = interface_of(assumed, *between, request.dt, own.delay, quantum)
     clock, position = _set_points(request, loop, own, interface.every, unit)
     controller = gains.put(assumed)
     setup = ClosedLoopSetup(
@@ -338,7 +343,7 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
         dt=request.dt,
         controller=gains.controller,
         gains=parameter_values(controller),
-        between=between_in_words(*between, own.delay, unit),
+        between=between_in_words(*between, own.delay, unit, quantum),
     )
     notes = _notes(data)
     data = _with_measured(request, plant, data)
@@ -364,7 +369,7 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
         by_set_point=by_set_point,
         mismatches=mismatches(assumed, plant),
         settings=sources,
-        loop=settings_of(assumed, own, sigma),
+        loop=settings_of(assumed, own, *sensor),
         controller=controller,
     )
 

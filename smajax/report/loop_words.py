@@ -21,7 +21,7 @@ def limit_words(loop: LoopSettings, largest: float | None = None) -> str:
 
 
 def loop_rows(loop: LoopSettings, largest: float | None = None) -> list[list[str]]:
-    """A row a setting: limit of the command, period, delay, filter, noise. largest: as `limit_words`'."""
+    """A row a setting: limit of the command, period, delay, filter, sensor. largest: as `limit_words`'."""
     return [
         ["limit of the command", limit_words(loop, largest)],
         ["control period", "not known" if loop.period is None else f"{1e3 * loop.period:g} ms"],
@@ -35,7 +35,7 @@ def loop_rows(loop: LoopSettings, largest: float | None = None) -> list[list[str
 
 
 def loop_words(loop: LoopSettings) -> str:
-    """`the drive's limit of 6 V, a control period of 10 ms`; "" of nothing known. The noise is the plant's, and left out."""
+    """`the drive's limit of 6 V, a control period of 10 ms`; "" of nothing known. The sensor is the plant's, and left out."""
     parts = []
     if loop.command_limit is not None:
         parts.append(f"the drive's limit of {digits(loop.command_limit, 4)} {loop.command_unit}")
@@ -49,11 +49,10 @@ def loop_words(loop: LoopSettings) -> str:
 
 
 def noise_words(loop: LoopSettings) -> str:
-    """`0.1 mm of noise`, or `no noise`."""
-    if not loop.noise:
-        return "no noise"
+    """`0.1 mm of noise, in steps of 0.02 mm`, or `no noise`."""
     shown = display(loop.position_unit)
-    return f"{digits(shown.of(loop.noise), 3)} {shown.unit} of noise"
+    said = f"{digits(shown.of(loop.noise), 3)} {shown.unit} of noise" if loop.noise else "no noise"
+    return said + (f", in steps of {digits(shown.of(loop.quantum), 3)} {shown.unit}" if loop.quantum else "")
 
 
 def source_sentences(sources: Iterable[Source]) -> tuple[str, ...]:

@@ -224,6 +224,7 @@ LONG = {
     "sweep --seconds 10ms": "'--seconds': 0.1 to 86400 s, not `10ms`",
     "sweep --seconds 10kg": "'--seconds': got unit 'kg'",
     "sweep --noise nan": "'--noise': got 'nan', expected a number and a unit like '1.5 deg'",
+    "tune pid --quantum nan": "'--quantum': got 'nan', expected a number and a unit like '1.5 deg'",
     "sweep --noise 9rad": "'--noise': 0 to 360 deg, not `9rad`",
     "sweep --period nan": "'--period': got 'nan', expected a number and a unit like '1.5 s'",
     "sweep --period 15ms": "a whole number of simulation steps of 0.01 s, not 0.015 s",

@@ -21,7 +21,7 @@ def tuned(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("tune") / "out"
     little = ["--starts", "1", "--rounds", "2", "--finish", "2", "--fast"]
     words = ["tune", "pid", *HANGING, "--set-point", "5mm,1.2cm", "--variation", "payload=20%", *little, *SHORT]
-    told = smajax(*words, "--noise", "10um", "--limits", "overshoot=3mm", "--out", out)
+    told = smajax(*words, "--noise", "10um", "--quantum", "0.02mm", "--limits", "overshoot=3mm", "--out", out)
     assert told.code == 0, told.said
     assert "V/m" in told.out
     return out
@@ -32,6 +32,9 @@ def test_gains_are_tuned_on_a_dead_weight_in_millimetres(tuned: Path) -> None:
     record = json.loads((tuned / "tune.json").read_text(encoding="utf-8"))
     assert record["settings"]["set_points_mm"] == [5.0, 12.0]
     assert record["settings"]["noise_mm"] == pytest.approx(0.01)
+    assert record["settings"]["quantum_mm"] == pytest.approx(0.02)
+    assert record["loop"]["quantum"] == {"value": pytest.approx(2e-5), "unit": "m"}
+    assert "in steps of 0.02 mm" in (tuned / "tune.html").read_text(encoding="utf-8")
     assert record["gains"]["integral_gain"]["unit"] == "V/(m s)"
     assert record["cost"]["after"] <= record["cost"]["before"]
 

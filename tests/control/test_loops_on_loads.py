@@ -24,6 +24,7 @@ from smajax.control.run_request import LoopRequest, RunRequest, run_closed
 from smajax.model.load.coupon import Coupon
 from smajax.model.system import System
 from smajax.model.wire.heat import mass_per_metre
+from smajax.report.loop_words import noise_words
 from smajax.report.note_words import note_sentences
 from tests.helpers.often import often
 from tests.helpers.own_load import Lever, Scheduled
@@ -259,12 +260,24 @@ def test_a_controller_may_assume_another_plant_than_runs() -> None:
     assert float(knowing.proportional_gain) != float(CONTROLLERS["pid"].make(HANGING).proportional_gain)
 
 
+def test_a_loop_is_closed_over_a_counter_of_its_own_steps() -> None:
+    sensor = loop_around(HANGING, "pid", quantum="20 um").sensor
+    assert sensor is not None
+    assert float(sensor.quantum) == pytest.approx(2e-5)
+    assert float(sensor.noise_sigma) == 0.0
+
+
 def test_a_request_by_names_is_in_the_load_s_unit() -> None:
     request = RunRequest("flexinol_table_3_2", "dead_weight", "flexinol_voltage", dt=0.01, tolerance=None)
     result = run_closed(request, LoopRequest("pid", "6:5s", noise="10um", mismatch={"payload": "+20%"}))
     assert 1e3 * float(result.data["position"][-1]) == pytest.approx(6.0, abs=0.05)
     assert "the position with 0.01 mm of noise" in result.data.attrs["between"]
     assert [one.name for one in result.mismatches] == ["load_mass"]
+    counted = run_closed(request, LoopRequest("pid", "6:5s", quantum="0.5mm"))
+    assert "the position without noise in steps of 0.5 mm" in counted.data.attrs["between"]
+    assert counted.loop is not None
+    assert counted.loop.quantum == pytest.approx(5e-4)
+    assert noise_words(counted.loop) == "no noise, in steps of 0.5 mm"
     beyond = run_closed(request, LoopRequest("pid", "40mm:2s"))
     assert any("the stroke of the wire under this load" in note for note in note_sentences(beyond.notes))
 

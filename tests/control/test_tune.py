@@ -9,7 +9,9 @@ import pytest
 
 from smajax.control.figures_of_merit import Merit
 from smajax.control.gain_search import regulation_cost
+from smajax.control.measured_state import Sensor
 from smajax.control.presets import CONTROLLERS
+from smajax.control.signal_path import Interface
 from smajax.control.sweep.batched_loops import LoopSetup, closed_loops
 from smajax.control.tune import trust
 from smajax.control.tune.evaluate import STEP, TuningProblem
@@ -95,6 +97,24 @@ def test_the_gradient_of_the_objective_agrees_with_differences(surface: TuningPr
             for sign in (1.0, -1.0)
         ]
         assert slope[0, k] == pytest.approx(float(ends[0][0][0] - ends[1][0][0]) / (2 * step), rel=1e-4, abs=1e-6)
+
+
+def test_a_counter_s_steps_are_in_the_loops_that_are_judged_and_noise_where_slopes_are_taken(
+    surface: TuningProblem,
+) -> None:
+    """Of a counted reading every derivative is zero."""
+    point = surface.point(CALM)[None]
+
+    def rig(**of_sensor: float) -> TuningProblem:
+        interface = Interface(sensor=Sensor(**of_sensor))
+        return TuningProblem(CONTROLLERS["vsc3"], arm(), seconds=SECONDS, loops=16, interface=interface)
+
+    counted, noisy, exact = rig(quantum=0.2), rig(noise_sigma=0.2 / 12.0**0.5), rig(noise_sigma=0.0)
+    one, other = (each.evaluate_gradients(point, SCENARIOS, 0.2) for each in (counted, noisy))
+    np.testing.assert_allclose(one.gradients, other.gradients, rtol=1e-9)
+    assert np.abs(one.gradients).max() > 1.0
+    coarse, fine = (each.evaluate(point, SCENARIOS, STEP).exact for each in (counted, exact))
+    assert np.abs(coarse - fine).max() > 0.1
 
 
 @pytest.mark.parametrize("by", ["trust-region", "adam"])

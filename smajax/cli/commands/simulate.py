@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from smajax.cli import completion
-from smajax.cli.loop_options import Delay, Estimator, Noise, Period
+from smajax.cli.loop_options import Delay, Estimator, Noise, Period, Quantum
 from smajax.cli.options import Finely, Json, Open, Overwrite, quantity, texts, tolerance_of
 from smajax.cli.plant_options import OtherPlant, loaded
 from smajax.cli.terminal import browse, command_line, console, resumable
@@ -25,6 +25,7 @@ OPTIONS = {
     "mismatch": "--mismatch",
     "set_points": "--set-point",
     "noise": "'--noise'",
+    "quantum": "'--quantum'",
     "plant": "--plant",
 }  # part of a run -> its option
 WIRE, LOAD, DRIVE = "niti_table_3_1", "arm", "amplified_voltage"
@@ -247,6 +248,7 @@ def simulate(
     plant: OtherPlant = None,
     estimator: Estimator = None,
     noise: Noise = "",
+    quantum: Quantum = "",
     period: Period = None,
     delay: Delay = None,
     seed: Annotated[int, typer.Option(help="of the noise")] = 0,
@@ -300,7 +302,17 @@ def simulate(
     compared = _inputs("--measured", measured)
     request = RunRequest(wire, load, drive, law, changed, series, time, seconds, dt, finely, kept, compared)
     loop = LoopRequest(
-        controller, set_point or "", gains, perturbed, estimator, noise or None, period, delay, seed, true
+        controller,
+        set_point or "",
+        gains,
+        perturbed,
+        estimator,
+        noise or None,
+        quantum or 0.0,
+        period,
+        delay,
+        seed,
+        true,
     )
     request, result = _run(options, request, loop)
     command = command_line()

@@ -16,7 +16,7 @@ from smajax.cli.loop_options import (
     LoopSeconds,
     NoiseOfSweep,
     Period,
-    Quantum,
+    QuantumOfSweep,
     noise_option,
 )
 from smajax.cli.options import (
@@ -183,7 +183,7 @@ def sweep(
     seconds: LoopSeconds = None,
     estimator: FilterOfSweep = None,
     noise: NoiseOfSweep = "",
-    quantum: Quantum = "",
+    quantum: QuantumOfSweep = "",
     period: Period = None,
     delay: DelayOfSweep = None,
     tolerance: Finely = "auto",

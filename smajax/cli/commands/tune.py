@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from smajax.cli import completion
-from smajax.cli.loop_options import Delay, Estimator, LoopSeconds, Noise, Period
+from smajax.cli.loop_options import Delay, Estimator, LoopSeconds, Noise, Period, Quantum, noise_option
 from smajax.cli.options import (
     UNMET,
     Finely,
@@ -191,6 +191,7 @@ def tune(
     seconds: LoopSeconds = None,
     estimator: Estimator = None,
     noise: Noise = "",
+    quantum: Quantum = "",
     period: Period = None,
     delay: Delay = None,
     seed: Annotated[int, typer.Option(callback=within(0), help="of starting points, plants and noise")] = 0,
@@ -240,6 +241,7 @@ def tune(
     initial = _initial_gains(start, controller, assumed)
     units = {name: term.unit for name, term in terms_in(unit).items()}
     sigma, source = plant.noise(noise, unit)
+    steps = noise_option(quantum, unit, "--quantum")
     given: dict[str, Any] = {
         "weights": pairs("--weights", weights, {}, "settling_time=1,overshoot=1") or None,
         "seconds": seconds,
@@ -258,6 +260,7 @@ def tune(
         limits=pairs("--limits", limits, units, "settling_time=4,overshoot=2deg"),
         by=by,
         noise=sigma,
+        quantum=steps or 0.0,
         seed=seed,
         tolerance=tolerance_of(tolerance),
         **set_points_of(assumed, set_points, fast),

@@ -165,7 +165,7 @@ class TuningProblem:
         return np.stack([self.point(self.gains(one)) for one in points])
 
     def evaluate_gradients(self, points: np.ndarray, scenarios: Scenarios, softness: float) -> Evaluation:
-        """Terms with gradients of every point (C, gains); a switching controller is smoothed by `softness`."""
+        """Terms with gradients of every point (C, gains); a switching controller is smoothed by `softness`, a sensor's steps are noise."""
         return self._evaluated(_sloped, points, scenarios, STEP, softness, True)
 
     def evaluate(self, points: np.ndarray, scenarios: Scenarios, dt: float = FINE) -> Evaluation:
@@ -177,6 +177,8 @@ class TuningProblem:
     ) -> Evaluation:
         inside = round(STEP / dt)
         interface = dataclasses.replace(self.interface, every=self.interface.every * inside)
+        if smooth and interface.sensor is not None and float(interface.sensor.quantum) > 0.0:
+            interface = dataclasses.replace(interface, sensor=interface.sensor.smoothed())
         arm = is_arm(self.system)
         length = 1.0 if arm else float(stroke_of(self.system) / arm_scales().position)
         problem = _Problem(

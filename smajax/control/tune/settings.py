@@ -32,7 +32,7 @@ from smajax.simulation.integration_error import AUTO, Tolerance
 
 @dataclass(frozen=True)
 class TuneSettings:
-    """A tuning; set points and noise in `unit`, weights and limits in the units of `terms_in(unit)`."""
+    """A tuning; set points, noise and quantum in `unit`, weights and limits in the units of `terms_in(unit)`."""
 
     controller: str
     set_points: tuple[float, ...] = (-40.0, -20.0, 0.0, 20.0, 40.0, 60.0, 85.0)
@@ -48,6 +48,7 @@ class TuneSettings:
     seconds: float = 10.0
     estimator: str = ""
     noise: float = 0.0
+    quantum: float = 0.0  # between two values of the readings; 0: no steps
     period: float = STEP  # s
     delay: int = 0
     seed: int = 0
@@ -87,7 +88,7 @@ class TuneSettings:
             raise ValueError(
                 f"the settings say {self.batch} plants of a batch, and {plants!r} was given: use `settings_for`."
             )
-        check_interface(self.estimator, self.noise, self.period, STEP)
+        check_interface(self.estimator, self.noise, self.period, STEP, self.quantum)
         steps = self.seconds / self.period
         if steps < 1.0 or abs(steps - round(steps)) > 1e-6:
             raise ValueError(
@@ -131,7 +132,7 @@ class TuneSettings:
 
     def between_in_words(self) -> str:
         """What lies between plant and controller."""
-        return between_in_words(self.estimator, self.noise, self.period, self.delay, self.shown)
+        return between_in_words(self.estimator, self.noise, self.period, self.delay, self.shown, self.quantum)
 
     def record(self) -> dict[str, Any]:
         """For JSON."""
@@ -156,6 +157,7 @@ class TuneSettings:
             "plants_of_the_check": self.unseen,
             "start": dict(self.start),
             "tolerance": self.tolerance,
+            **({f"quantum_{self.unit}": self.quantum} if self.quantum else {}),
             **({"plants_of_the_batch": self.batch} if self.batch else {}),
             **({"fixed": dict(self.fixed)} if self.fixed else {}),
             **({"box": {name: list(ends) for name, ends in self.box.items()}} if self.box else {}),
@@ -174,7 +176,7 @@ def regulation_weights(system: System) -> dict[str, float]:
 def settings_for(system: System, controller: str, plants: Plants | None = None, **given: Any) -> TuneSettings:
     """A tuning on any plant: what is not given is the arm's, or that of the load's unit, stroke and time.
 
-    given: fields of `TuneSettings`. Set points and noise in degrees of an angle and millimetres of a length, weights and limits
+    given: fields of `TuneSettings`. Set points, noise and quantum in degrees of an angle and millimetres of a length, weights and limits
     in these too.
     """
     unit = unit_of(system)

@@ -90,7 +90,9 @@ def problem_of(system: System, settings: TuneSettings, plants: PlantSet | None =
         system,
         box=settings.box or None,
         seconds=settings.seconds,
-        interface=interface_of(plant, settings.estimator, settings.noise, settings.period, STEP, settings.delay),
+        interface=interface_of(
+            plant, settings.estimator, settings.noise, settings.period, STEP, settings.delay, settings.quantum
+        ),
         seed=settings.seed,
         loops=int(np.clip(1 << (size - 1).bit_length(), LEAST_LOOPS, LOOPS)),
         plants=plants,
@@ -233,8 +235,8 @@ def _validated(
 
 def loop_settings(system: System, settings: TuneSettings) -> LoopSettings:
     """What lies between plant and controller, as a file of gains has it."""
-    noise = float(settings.shown.to_own(settings.noise))
-    return settings_of(system, LoopInUse(None, settings.period, settings.delay, settings.estimator), noise)
+    sensor = [float(settings.shown.to_own(one)) for one in (settings.noise, settings.quantum)]
+    return settings_of(system, LoopInUse(None, settings.period, settings.delay, settings.estimator), *sensor)
 
 
 def _integrated(
