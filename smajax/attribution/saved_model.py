@@ -63,6 +63,7 @@ def saved_model(
                 output.noise_sigma,
                 output.offset,
                 None if error is None else rounded(error),
+                None if output.reading_sigma is None else rounded(output.reading_sigma),
             )
             for output, error in zip(job.experiment.outputs, missed, strict=True)
         ],

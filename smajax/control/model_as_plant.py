@@ -66,12 +66,19 @@ def largest_fitted(model: ModelRecord) -> float | None:
 
 
 def noise_of_file(model: ModelRecord | None) -> NoiseOfModelFile | None:
-    """That of a sample of the position's sensor as the model's file has it; None where it has none."""
+    """That of a reading of the position's sensor as the model's file has it; None where it has none.
+
+    A loop reads its sensor once a period: where a sample of the fit averages several readings, one of them has more noise.
+    """
     if model is None:
         return None
     name, unit = model.system.load.reading
-    noise = next((one.noise for one in model.outputs if (one.name, one.unit) == (name, unit)), 0.0)
-    return NoiseOfModelFile(noise, name, unit) if noise else None
+    own = next((one for one in model.outputs if (one.name, one.unit) == (name, unit)), None)
+    if own is None or not own.noise:
+        return None
+    if own.reading_noise is None or own.reading_noise <= own.noise:
+        return NoiseOfModelFile(own.noise, name, unit)
+    return NoiseOfModelFile(own.reading_noise, name, unit, own.noise)
 
 
 def true_plant(model: ModelRecord, changed: Mapping[str, str | float], assumed: System, controller: str) -> System:

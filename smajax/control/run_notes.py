@@ -27,6 +27,7 @@ class NoiseOfModelFile:
     noise: float  # standard deviation, in `unit`
     reading: str
     unit: str  # rad or m
+    of_sample: float | None = None  # where a sample of the fit averages several readings: its noise
 
 
 @dataclass(frozen=True)

@@ -63,5 +63,6 @@ def _outputs(setup: Setup, fitted: Fitted, runs: Sequence[IdentifiedRun]) -> lis
         error = error[np.isfinite(error)]
         missed = rounded(float(np.quantile(error, BAND))) if error.size else None
         sigma = float(fitted.problem.noise[k, 0])
-        result.append(ModelOutput(output.name, output.unit, rounded(sigma), output.offset, missed))
+        single = None if output.reading_sigma is None else rounded(max(output.reading_sigma, sigma))
+        result.append(ModelOutput(output.name, output.unit, rounded(sigma), output.offset, missed, single))
     return result

@@ -68,10 +68,13 @@ def source_sentence(source: Source | None) -> str:
                 f"The {command} is limited to {digits(largest, 4)} {unit}, the largest of the runs that the model was fitted to; give "
                 f"{LIMIT_PARAMETER} in the model file or with --set for another limit."
             )
-        case NoiseOfModelFile(noise, reading, unit):
+        case NoiseOfModelFile(noise, reading, unit, of_sample):
             shown = display(unit, reading)
-            said = f"{digits(shown.of(noise), 3)} {shown.unit}"
-            return f"The sensor has the noise of the model file, {said} (1 sigma); --noise gives another one, --noise 0 none."
+            said, sample = (f"{digits(shown.of(one or 0.0), 3)} {shown.unit}" for one in (noise, of_sample))
+            single = (
+                f" of a single reading (a sample of its fit, which averages several, has {sample})" if of_sample else ""
+            )
+            return f"The sensor has the noise of the model file, {said} (1 sigma){single}; --noise gives another one, --noise 0 none."
         case PresetGains(controller, scaled):
             how = ", scaled from the arm to this load's stroke, force and time" if scaled else ""
             return (

@@ -13,10 +13,13 @@ import pytest
 from smajax.cli.commands.sweep import loop_of
 from smajax.control.gains_file import Gains, GainsFileError, read_gains
 from smajax.control.loop_settings import LoopInUse, LoopSettings, joined
+from smajax.control.model_as_plant import noise_of_file
 from smajax.control.run_request import LoopRequest, RunRequest, run_closed
 from smajax.control.run_result import RunResult
 from smajax.data.model_file.of_presets import model_of_presets
-from smajax.report.loop_words import limit_words, source_sentences
+from smajax.data.model_file.read import load_model
+from smajax.data.model_file.record import ModelOutput
+from smajax.report.loop_words import limit_words, source_sentence, source_sentences
 from smajax.report.note_words import note_sentences
 from smajax.report.simulate_page import settings_rows
 from tests.fit.test_predict import NOISE, kept_model
@@ -160,6 +163,19 @@ def test_the_noise_is_that_of_the_model_file_unless_an_option_says_otherwise(gai
     other = run_closed(request, LoopRequest("", "5mm:0.4s", gains, noise="50 um"))
     assert other.loop is not None
     assert other.loop.noise == pytest.approx(5e-5)
+
+
+def test_a_loop_reads_its_sensor_once_where_a_sample_of_the_fit_averages_several(tmp_path: Path) -> None:
+    several = ModelOutput("position", "m", NOISE, False, None, 3e-4)
+    kept = load_model(dataclasses.replace(kept_model(), outputs=(several,)).save(tmp_path / "model.toml"))
+    assert kept.outputs == (several,)
+    assert not kept.warnings
+    source = noise_of_file(kept)
+    assert source is not None
+    assert source.noise == 3e-4
+    assert source_sentence(source).startswith(
+        "The sensor has the noise of the model file, 0.3 mm (1 sigma) of a single reading (a sample of its fit, which averages several, has 0.1 mm);"
+    )
 
 
 def test_of_two_limits_of_the_command_the_page_says_which_one_holds() -> None:

@@ -179,7 +179,7 @@ def _output(path: Path, file: ExperimentFile, name: str, unit: str, runs: Sequen
                 + f": no sensor has that noise there; expected one like '{example}', or '{ESTIMATE}'",
             )
         how = f"given as {given}" + (f", times {gain:.3g} for the average over a step" if gain < 1.0 else "")
-        return Output(name, unit, sensor * gain, how, True, offset), sensor
+        return Output(name, unit, sensor * gain, how, True, offset, sensor if gain < 1.0 else None), sensor
     for read in fit:
         _check_samples(path, key, name, file, read)
     # On the clock, where the residual is; the increment is the sensor's, since averaging hides it. Averages over windows that
@@ -196,7 +196,9 @@ def _output(path: Path, file: ExperimentFile, name: str, unit: str, runs: Sequen
     if sigma <= 0.0:
         raise ExperimentError(path, key, f"no noise can be seen in {name!r}; give it as text like '{example}'")
     how = f"estimated from {len(fit)} fit run{'s' if len(fit) > 1 else ''} (median)"
-    return Output(name, unit, sigma, how, False, offset), float(np.median(sensors))
+    sensor = float(np.median(sensors))
+    single = max(sensor, sigma) if gain < 1.0 else None
+    return Output(name, unit, sigma, how, False, offset, single), sensor
 
 
 def _fitted_before(kept: FromModelFile, file: ExperimentFile, runs: Sequence[Run]) -> list[str]:

@@ -72,7 +72,7 @@ class Output:
     """A sensor, in the program's own unit.
 
     noise_sigma: white measurement noise on the clock; noise_how: where that number is from; noise_given: by the file.
-    offset: whether each run has an unknown zero of it.
+    offset: whether each run has an unknown zero of it. reading_sigma: of a single reading, where a sample on the clock averages several; else None.
     """
 
     name: str
@@ -81,6 +81,7 @@ class Output:
     noise_how: str
     noise_given: bool
     offset: bool
+    reading_sigma: float | None = None
 
 
 @dataclass(frozen=True)

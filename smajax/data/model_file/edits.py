@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 from smajax.core.display_units import digits
 from smajax.core.wording import and_listed
-from smajax.data.model_file.record import ModelRecord
+from smajax.data.model_file.record import ModelOutput, ModelRecord
 
 Record = TypeVar("Record", bound=ModelRecord)
 CLOSE = 1e-9  # of a value: nearer than that it is the one that was written
@@ -23,11 +23,17 @@ def as_written(model: ModelRecord) -> str:
         {
             "parts": _parts(model),
             "parameters": {name: [one.value, one.standard_error] for name, one in model.parameters.items()},
-            "outputs": {one.name: [one.noise, one.offset, one.prediction_error] for one in model.outputs},
+            "outputs": {one.name: _of_output(one) for one in model.outputs},
             "fitted_range": {name: list(ends) for name, ends in model.fitted_range.items()},
             "fitted_to": [[one.name, one.role, one.sha256] for one in model.runs],
         }
     )
+
+
+def _of_output(one: ModelOutput) -> list[float | None]:
+    """A file of before has nothing of single readings."""
+    single = [] if one.reading_noise is None else [one.reading_noise]
+    return [one.noise, one.offset, one.prediction_error, *single]
 
 
 def _parts(model: ModelRecord) -> dict[str, str]:

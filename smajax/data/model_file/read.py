@@ -171,7 +171,8 @@ def _outputs(path: Path, file: ModelFile, sensors: Mapping[str, str]) -> tuple[M
     for name, one in file.outputs.items():
         check_name(path, f"outputs.{name}", "output", name, sensors)
         numbers: dict[str, float | None] = {}
-        for key, given in (("noise", one.noise), ("prediction_error", one.prediction_error)):
+        for key in ("noise", "prediction_error", "reading_noise"):
+            given = getattr(one, key)
             if given is None:
                 numbers[key] = None
                 continue
@@ -180,9 +181,8 @@ def _outputs(path: Path, file: ModelFile, sensors: Mapping[str, str]) -> tuple[M
             if not number > 0.0:
                 raise ExperimentError(path, f"outputs.{name}.{key}", f"got {given!r}, expected a size above zero")
             numbers[key] = number
-        result.append(
-            ModelOutput(name, sensors[name], numbers["noise"] or 0.0, one.offset, numbers["prediction_error"])
-        )
+        more = numbers["prediction_error"], numbers["reading_noise"]
+        result.append(ModelOutput(name, sensors[name], numbers["noise"] or 0.0, one.offset, *more))
     return tuple(result)
 
 

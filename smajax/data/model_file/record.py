@@ -81,7 +81,8 @@ class LikelyModel:
 class ModelOutput:
     """A sensor that the model was fitted to, SI. noise: sigma of a sample. offset: whether each run has its own zero.
 
-    prediction_error: what nine of ten samples of runs that the fit had not seen stay within; None where none was left out.
+    prediction_error: what nine of ten samples of runs that the fit had not seen stay within; None where none was left out. reading_noise: sigma of
+    a single reading, where a sample averages several, else None.
     """
 
     name: str
@@ -89,6 +90,7 @@ class ModelOutput:
     noise: float
     offset: bool
     prediction_error: float | None = None
+    reading_noise: float | None = None
 
 
 @dataclass(frozen=True)

@@ -50,6 +50,7 @@ class OutputSection(Section):
     noise: Quantity = Field(description="text like '0.01 mm'")
     offset: bool = Field(default=False, description="true or false: whether each run has its own zero")
     prediction_error: Quantity | None = Field(default=None, description="text like '0.02 mm'")
+    reading_noise: Quantity | None = Field(default=None, description="text like '0.03 mm'")
 
 
 class AlternativeSection(Section):
