@@ -20,6 +20,7 @@ from smajax.report.formulas import typeset
 from smajax.report.frame import environment, parts_of_frame
 from smajax.report.identifiability_words import remark_text
 from smajax.report.narrative import Narrative, narrate
+from smajax.report.narrative.caveats import zero_so_far
 from smajax.report.narrative.rounds import chosen_text
 from smajax.report.narrative.unknown import units
 from smajax.report.narrative.values import far_text
@@ -300,6 +301,7 @@ def findings_to_html(findings: Findings, narrative: Narrative | None = None, ste
     def output(value: float | None) -> Shown:
         return shown(value, findings.output_unit, findings.output_name, 3, zeros=True)
 
+    unnamed = zero_so_far(findings)
     first, correlation_of = run_plots.first_plot(findings), run_plots.residual_correlation(findings)
     return (
         environment()
@@ -330,6 +332,8 @@ def findings_to_html(findings: Findings, narrative: Narrative | None = None, ste
             averaged=findings.averaged and all(run.average is not None for run in findings.runs),
             held_out=any(run.role == "held-out" for run in findings.runs),
             added=findings.added,
+            named=[one for one in findings.added if one not in unnamed],
+            unnamed=unnamed,
             ranked=pictures.ranked(findings.effects),
             evidence=_evidence(findings),
             known=lambda value: value is not None and math.isfinite(value),

@@ -15,11 +15,13 @@ import pytest
 import smajax as sma
 from smajax.attribution import close_loop as stages
 from smajax.attribution.close_loop import Interim
-from smajax.attribution.findings import Findings, Verdict
+from smajax.attribution.findings import CoefficientFinding, Findings, Remaining, Verdict
 from smajax.cli.budget import run_within, without
 from smajax.cli.commands.close_loop import run_close_loop
+from smajax.report.html import findings_to_html
+from smajax.report.narrative import narrate
 from smajax.report.write import write_report
-from tests.helpers.made_findings import made_findings
+from tests.helpers.made_findings import NAN, made_findings
 from tests.helpers.small_bench import bench, smajax
 
 pytestmark = pytest.mark.usefixtures("blank_pictures")
@@ -93,6 +95,43 @@ def test_the_page_is_there_after_the_base_fit_and_says_what_is_to_come(tmp_path:
     assert "by posterior probability" not in page  # a table without a number
     assert "not finished: the search for effects" in sma.load_model(tmp_path / "report").warnings[0]
     assert sma.load_model(tmp_path / "report").values["convection_coefficient"] == known.before[0].value
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "probability", "named"),
+    [(2.4e4, 210.0, NAN, True), (150.0, 210.0, NAN, False), (2.4e4, 210.0, 0.3, False), (2.4e4, 210.0, 0.98, True)],
+)
+def test_an_unfinished_page_names_only_effects_that_its_own_numbers_tell_from_none(
+    value: float, error: float, probability: float, named: bool
+) -> None:
+    whole = made_findings()
+    effects = tuple(
+        dataclasses.replace(
+            one,
+            coefficients={"enthalpy": CoefficientFinding(value, error, "J/kg")},
+            evidence={**one.evidence, "posterior_probability": probability},
+        )
+        if one.added
+        else one
+        for one in whole.effects
+    )
+    known = dataclasses.replace(
+        whole, effects=effects, verdict=Verdict.NOT_FINISHED, remaining=Remaining.REST_OF_THE_SEARCH
+    )
+    page, summary = findings_to_html(known), narrate(known).summary
+    headline = page.split("<h1>")[1].split("</h1>")[0]
+    assert ("latent heat" in headline) == named
+    assert any("absorbs heat without getting warmer" in one for one in summary) == named
+    assert (
+        any(
+            "also has latent heat of transformation, which the numbers so far do not tell from none" in one
+            for one in summary
+        )
+        != named
+    )
+    assert ("not told from none so far" in page) != named
+    # A finished page has its own words for what ends at zero.
+    assert "not told from none" not in findings_to_html(dataclasses.replace(whole, effects=effects))
 
 
 def test_a_time_that_is_over_before_the_base_fit_leaves_no_page_and_says_so(tmp_path: Path) -> None:

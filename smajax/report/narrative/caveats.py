@@ -20,11 +20,14 @@ from smajax.attribution.paired_errors import Comparison, runs_compared
 from smajax.attribution.record_error import OutlierRun
 from smajax.core.display_units import digits, label
 from smajax.core.wording import and_listed
+from smajax.model.effects.library import LIBRARY
 from smajax.report.identifiability_words import remark_text
 from smajax.report.narrative.values import assumed_text, error_text, far_text, value_text
 
 NAMED_SIZES = 4  # in a sentence
 UNLIKE = 2.0  # by which the noises that outputs leave differ and are more than noise
+NORMAL_95 = 1.96
+EVEN = 0.5  # of a probability: as likely as not
 NOTHING_MORE = (Verdict.ADEQUATE, Verdict.EXPLAINED)
 
 
@@ -114,6 +117,38 @@ def of_coefficients_at_bounds(findings: Findings) -> Iterator[str]:
             else "they stand in for something else, or their ranges are"
         )
         yield f"Mind: {and_listed(ends)}: {why} too narrow."
+
+
+def zero_so_far(findings: Findings) -> list[EffectFinding]:
+    """Of an unfinished search: effects of its likeliest model that the numbers known by then do not tell from none.
+
+    Each of their sizes ends at zero or is within 1.96 standard errors of it, or a model without them is likelier.
+    """
+    if not findings.remaining:
+        return []
+    off = {one.name for one in findings.after if one.at_zero}
+
+    def none_of_it(effect: EffectFinding) -> bool:
+        if effect.evidence.get("posterior_probability", np.nan) < EVEN:
+            return True
+        sizes = {
+            name: one for name, one in effect.coefficients.items() if name in LIBRARY[effect.name].candidate.switches
+        }
+        return bool(sizes) and all(
+            f"{effect.name}.{name}" in off or abs(one.value) < NORMAL_95 * (one.standard_error or 0.0)
+            for name, one in sizes.items()
+        )
+
+    return [effect for effect in findings.added if none_of_it(effect)]
+
+
+def of_zeros_so_far(findings: Findings) -> Iterator[str]:
+    """That such effects are in the model, and not found."""
+    if named := [effect.title for effect in zero_so_far(findings)]:
+        yield (
+            f"The likeliest model by then also has {and_listed(named)}, which the numbers so far do not tell from none: "
+            f"{'it is' if len(named) == 1 else 'they are'} not named."
+        )
 
 
 def of_bounds(findings: Findings) -> Iterator[str]:

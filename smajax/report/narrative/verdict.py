@@ -62,11 +62,15 @@ def summary(findings: Findings) -> tuple[str, ...]:
     place = 1 if findings.added or _in_one_run(findings) else 0
     sentences[place:place] = [*_unconfirmed(findings), *(_rejected(findings, one) for one in findings.rejected)]
     sentences += _errors(findings)
+    sentences += caveats.of_zeros_so_far(findings)
     sentences += caveats.of_bounds(findings)
     if (model := findings.extended_model or findings.base_model) is not None:
         sentences += range_sentences(model.values)
     sentences += caveats.of_priors_left(findings)
+    unnamed = caveats.zero_so_far(findings)
     for effect in findings.added:
+        if effect in unnamed:
+            continue
         meaning = caveats.of_the_preset(findings, effect) or LIBRARY[effect.name].candidate.sentence
         values = {name: one.value for name, one in effect.coefficients.items()}
         sentences += [meaning, *curve_sentences(effect.name, values), *caveats.of_a_size(findings, effect)]
