@@ -25,7 +25,7 @@ from smajax.attribution.likely_models_check import checked
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.values_per_run import on_runs, with_other_runs
 from smajax.fit.packed_runs import RunBatch
-from smajax.fit.prediction_band import BAND, averaged_band, reading_of
+from smajax.fit.prediction_band import BAND, averaged_band, in_band, reading_of
 
 LEAST_PROBABILITY = 0.02
 MOST_MODELS = 6
@@ -86,10 +86,11 @@ def averaged(
     missed = np.tile(prediction_errors(setting, final), batch.runs)[:, None]
     mean, half = averaged_band(np.stack(readings), np.stack(variances), weights, missed)
     mask = np.asarray(batch.mask) > 0
+    noise = (float(setting.problem.noise_sigma) / problem.scale_of_series[:, 0]).tolist()
     counts = mask.sum(axis=1) if samples is None else np.asarray(list(samples.values()))[problem.owner]
     return Averaged(
         tuple(AveragedModel(model.effects, weight) for model, weight in models),
-        tuple(_run(*one) for one in zip(problem.measured, mean, half, mask, counts.tolist(), strict=True)),
+        tuple(_run(*one) for one in zip(problem.measured, mean, half, mask, counts.tolist(), noise, strict=True)),
         dropped,
     )
 
@@ -113,12 +114,17 @@ def prediction_errors(setting: Search, final: Model) -> list[float]:
     return [float(np.quantile(missed[k::outputs][mask[k::outputs]], BAND)) for k in range(outputs)]
 
 
-def _run(measured: np.ndarray, reading: np.ndarray, half: np.ndarray, present: np.ndarray, samples: int) -> AveragedRun:
+def _run(  # a series of the problem, field by field
+    measured: np.ndarray, reading: np.ndarray, half: np.ndarray, present: np.ndarray, samples: int, noise: float
+) -> AveragedRun:
     error = (measured - reading)[present]
+    share = in_band(np.where(present, measured, np.nan), reading, half, noise)
     return AveragedRun(
         reading[:samples],
         half[:samples],
         float(np.sqrt(np.mean(error**2))) if error.size else float("nan"),
-        float(np.mean(np.abs(error) <= half[present])) if error.size else float("nan"),
+        share.whole,
         error.size,
+        share.moving,
+        share.samples_moving,
     )

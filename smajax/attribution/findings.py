@@ -6,7 +6,7 @@ Arrays are numpy, SI, temperatures in degrees Celsius, angles in radians; nothin
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from importlib import import_module
@@ -379,7 +379,19 @@ def pooled_rmse_of(runs: Sequence[RunFinding], output: str, role: Role, which: L
 
 def coverage(findings: Findings) -> float | None:
     """Share of the held-out samples inside the band of the averaged prediction; None without any."""
-    averages = [run.average for run in findings.runs if run.role == "held-out" and run.average is not None]
-    averages = [one for one in averages if one.samples]
-    samples = sum(one.samples for one in averages)
-    return sum(one.coverage * one.samples for one in averages) / samples if samples else None
+    return _weighed((one.coverage, one.samples) for one in _held_out_averages(findings))
+
+
+def moving_coverage(findings: Findings) -> float | None:
+    """The same of those at which the output moves (`fit.prediction_band.moving`)."""
+    return _weighed((one.moving_coverage, one.moving_samples) for one in _held_out_averages(findings))
+
+
+def _held_out_averages(findings: Findings) -> list[AveragedRun]:
+    return [run.average for run in findings.runs if run.role == "held-out" and run.average is not None]
+
+
+def _weighed(parts: Iterable[tuple[float, int]]) -> float | None:
+    """Mean of (share, samples); None without any."""
+    kept = [(share, samples) for share, samples in parts if samples]
+    return sum(share * samples for share, samples in kept) / sum(n for _, n in kept) if kept else None

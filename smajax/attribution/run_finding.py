@@ -21,6 +21,8 @@ class AveragedRun:
     rmse: float
     coverage: float  # share of the measured samples inside the band
     samples: int  # measured ones
+    moving_coverage: float = math.nan  # share of those at which the output moves (`fit.prediction_band.moving`)
+    moving_samples: int = 0
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence, Sized
 
 
@@ -23,6 +24,13 @@ def per_cent(share: float) -> str:
         if (share == 1.0 or float(text[:-1]) != 100.0) and (share == 0.0 or float(text[:-1]) != 0.0):
             return text
     return ">99.999%" if share > 0.5 else "<0.001%"
+
+
+def of_those_moving(whole: float, moving: float | None) -> str:
+    """` (85% of those at which the output moves)` beside the share of all samples; "" where none does, or both are the same."""
+    if moving is None or math.isnan(moving) or per_cent(moving) == per_cent(whole):
+        return ""
+    return f" ({per_cent(moving)} of those at which the output moves)"
 
 
 def and_listed(names: Sequence[str]) -> str:

@@ -31,7 +31,7 @@ from smajax.fit.prediction import PredictedRun as PredictedRun
 from smajax.fit.prediction import PredictedSeries as PredictedSeries
 from smajax.fit.prediction import Prediction as Prediction
 from smajax.fit.prediction_band import BAND as BAND
-from smajax.fit.prediction_band import NORMAL, averaged_band, reading_of
+from smajax.fit.prediction_band import NORMAL, averaged_band, in_band, moving, reading_of
 from smajax.fit.problem import Problem
 from smajax.model.channels import SHOWN
 
@@ -153,7 +153,9 @@ def _series(
     """`predicted`: (reading, half width of the band), (n,) each."""
     measured, (reading, half) = run.outputs[output.name], predicted
     present = np.isfinite(measured)
-    error, inside = (measured - reading)[present], (np.abs(measured - reading) <= half)[present]
+    error = (measured - reading)[present]
+    # The noise of these logs: that of a fit may hold what the model lacks, beside which nothing moves.
+    share = in_band(measured, reading, half, output.noise_sigma)
     return PredictedSeries(
         output=output.name,
         unit=output.unit,
@@ -163,5 +165,7 @@ def _series(
         noise=output.noise_sigma if known is None else known.noise,
         offset=float(offset),
         rmse=float(np.sqrt(np.mean(error**2))) if error.size else float("nan"),
-        coverage=float(np.mean(inside)) if error.size else float("nan"),
+        coverage=share.whole,
+        moving=moving(measured, output.noise_sigma),
+        moving_coverage=share.moving,
     )

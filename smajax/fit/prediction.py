@@ -25,6 +25,8 @@ class PredictedSeries:
     offset: float  # of the run, that was added to the reading: the average of the likely models'
     rmse: float
     coverage: float  # share of the measured samples inside the band
+    moving: np.ndarray  # bool, at which samples the output moves (`prediction_band.moving`)
+    moving_coverage: float  # share of these inside the band; nan where it never moves
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,7 @@ class OutputErrors:
 
     rmse: float
     coverage: float  # share of the measured samples inside the band
+    moving_coverage: float  # of those at which the output moves
     residual: ResidualDiagnostics | None  # None where nothing was measured
 
 
@@ -85,12 +88,13 @@ class Prediction:
         series = [run.series[output] for run in self.runs]
         error = np.concatenate([one.measured - one.reading for one in series])
         width = np.concatenate([one.half_width for one in series])
-        present = np.isfinite(error)
+        present, moves = np.isfinite(error), np.concatenate([one.moving for one in series])
         if not present.any():
-            return OutputErrors(float("nan"), float("nan"), None)
+            return OutputErrors(float("nan"), float("nan"), float("nan"), None)
         return OutputErrors(
             rmse=float(np.sqrt(np.mean(error[present] ** 2))),
             coverage=float(np.mean(np.abs(error) <= width, where=present)),
+            moving_coverage=float(np.mean(np.abs(error[moves]) <= width[moves])) if moves.any() else float("nan"),
             residual=self._diagnostics(output),
         )
 

@@ -15,6 +15,49 @@ BAND = 0.9  # share of the measured samples that are expected in the band
 NORMAL = float(scipy.special.ndtri(0.5 + 0.5 * BAND))  # standard deviations on either side that have that share
 
 
+NEIGHBOURS = 5  # samples on either side of one, whose means are compared
+MOVED = 2.0  # noises between these means, from which on an output moves: of noise alone one sample in 600 does
+
+
+class InBand(NamedTuple):
+    """Shares of the measured samples inside a band, NaN without such samples: of all, and of those at which the output moves."""
+
+    whole: float
+    moving: float
+    samples_moving: int
+
+
+def moving(measured: np.ndarray, noise: float | np.ndarray) -> np.ndarray:
+    """At which of the samples (n,) the output moves, bool: the means of its neighbours before and after differ by more than `MOVED` noises.
+
+    noise: sigma of a sample, one or (n,). A missing sample (NaN) does not move, and those beside it are neighbours.
+    """
+    present = np.isfinite(measured)
+    values = measured[present]
+    result = np.zeros(measured.shape, dtype=bool)
+    count = min(NEIGHBOURS, values.size - 1)
+    if count < 1:
+        return result
+    # At an end a series goes on as its mirror image, in which it rests.
+    sums = np.cumsum(np.concatenate([[0.0], np.pad(values - values.mean(), count, mode="reflect")]))
+    at = count + np.arange(values.size)
+    before, after = sums[at] - sums[at - count], sums[at + 1 + count] - sums[at + 1]
+    sigma = np.broadcast_to(noise, measured.shape)[present]
+    result[present] = np.abs(after - before) > count * MOVED * sigma
+    return result
+
+
+def in_band(measured: np.ndarray, reading: np.ndarray, half: np.ndarray, noise: float | np.ndarray) -> InBand:
+    """How many of the samples (n,) lie within `half` of the reading; at rest, where nothing happens, a model is right without merit."""
+    present, moves = np.isfinite(measured), moving(measured, noise)
+    inside = np.abs(measured - reading) <= half
+
+    def share(where: np.ndarray) -> float:
+        return float(np.mean(inside[where])) if where.any() else float("nan")
+
+    return InBand(share(present), share(moves), int(moves.sum()))
+
+
 class Reading(NamedTuple):
     """By one model: its reading with each run's offset, its variance by the parameters, (series, N), and that offset, (series,)."""
 

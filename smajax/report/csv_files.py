@@ -111,5 +111,6 @@ def predicted_runs(result: Prediction) -> str:
             ):
                 units[f"{one.output} {what}"] = one.unit
                 columns[f"{one.output} {what}"] = values
+            columns[f"{one.output} moves"] = one.moving
         series.append((run.name, "fit" if run.fitted else "held-out", columns))
     return _runs(series, units)

@@ -9,7 +9,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from smajax.attribution.findings import Findings, ParameterFinding, Role, coverage, pooled_rmse
+from smajax.attribution.findings import Findings, ParameterFinding, Role, coverage, moving_coverage, pooled_rmse
 from smajax.core.display_units import chance, correlation, digits, display, label, p_value, with_error
 from smajax.core.names_of_runs import is_of_run, of_run, parameter_of
 from smajax.core.wording import and_listed, per_cent, verdict_text
@@ -27,6 +27,7 @@ from smajax.report.narrative.values import far_text
 from smajax.report.narrative.verdict import headline
 from smajax.report.next_steps import Step, section
 from smajax.report.plain_page import MANY, breakable
+from smajax.report.predict_words import MOVES
 from smajax.report.series_picture import COARSE, series, series_of_runs
 from smajax.report.unknown_pictures import function_learnt
 
@@ -204,6 +205,9 @@ def _figures(findings: Findings, output: Callable[[float | None], Shown]) -> lis
     inside = coverage(findings)
     if inside is not None:
         figures.append({"caption": "held-out samples in the 90 % band", "text": per_cent(inside)})
+        moving = moving_coverage(findings)
+        if moving is not None:
+            figures.append({"caption": "of those at which the output moves", "text": per_cent(moving)})
     return figures
 
 
@@ -248,10 +252,16 @@ def _other_outputs(findings: Findings) -> list[dict[str, Any]]:
                         digits(one.rmse_after / one.noise_sigma, 3, zeros=True), one.rmse_after / one.noise_sigma
                     ),
                     "inside": Shown("–" if inside is None else per_cent(inside), inside),
+                    "moving": _share(None if one.average is None else one.average.moving_coverage),
                     "samples": one.samples,
                 }
             )
     return rows
+
+
+def _share(value: float | None) -> Shown:
+    known = value is not None and math.isfinite(value)
+    return Shown(per_cent(value) if known and value is not None else "–", value if known else None)
 
 
 def _hysteresis_dpi(number: int, many: bool) -> int:
@@ -336,6 +346,8 @@ def findings_to_html(findings: Findings, narrative: Narrative | None = None, ste
             unnamed=unnamed,
             ranked=pictures.ranked(findings.effects),
             evidence=_evidence(findings),
+            share=_share,
+            moves=MOVES,
             known=lambda value: value is not None and math.isfinite(value),
             evidence_title=lambda name: EVIDENCE.get(name, label(name)),
             evidence_unit=lambda name: _evidence_unit(findings, name),

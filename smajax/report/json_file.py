@@ -90,6 +90,7 @@ def _errors(one: BesideModels) -> dict[str, Any]:
         "offset_after": one.offset_after,
         "rmse_average": None if one.average is None else one.average.rmse,
         "band_coverage": None if one.average is None else one.average.coverage,
+        "band_coverage_moving": None if one.average is None else one.average.moving_coverage,
     }
 
 

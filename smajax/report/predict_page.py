@@ -19,7 +19,7 @@ from smajax.report.csv_files import RUNS, predicted_runs
 from smajax.report.integration_words import integration_sentence
 from smajax.report.next_steps import Step, section
 from smajax.report.plain_page import bullets, folded, headline, table, whole
-from smajax.report.predict_words import HEAD, band_sentence, conclusions, run_rows
+from smajax.report.predict_words import HEAD, MOVES, band_sentence, conclusions, run_rows
 from smajax.report.run_plots import measured_line, output_alone, output_panel, residual_panel, run_plot
 from smajax.report.series_picture import COARSE, series, series_of_runs
 from smajax.report.series_plot import Band, Line, SeriesPlot, samples_of
@@ -70,6 +70,7 @@ def record(result: Prediction, command: str = "") -> dict[str, Any]:
             "rmse": errors.rmse,
             "noise_sigma": one.noise,
             "band_coverage": errors.coverage,
+            "band_coverage_moving": errors.moving_coverage,
             "residual": _diagnostics(errors.residual),
         }
     return {
@@ -117,6 +118,7 @@ def _run(run: PredictedRun) -> dict[str, Any]:
                 "rmse": one.rmse,
                 "ratio": one.rmse / one.noise,
                 "band_coverage": one.coverage,
+                "band_coverage_moving": one.moving_coverage,
                 "offset": one.offset,
             }
             for one in run.series
@@ -147,10 +149,10 @@ def page(result: Prediction, command: str = "", steps: Sequence[Step] = ()) -> s
         headline(said[0]) if said else "",
         f'<div class="{"pair" if len(first) > 1 else ""}">{"".join(series(plot, samples, dpi=COARSE) for plot in first)}</div>',
         bullets(said[1:]),
-        f"<p class=quiet>{html.escape(band_sentence(result))}</p>",
+        f"<p class=quiet>{html.escape(band_sentence(result))} {html.escape(MOVES)}</p>",
         section(steps),
         "<h2>Runs</h2>",
-        table(HEAD, run_rows(result), (2, 3, 4, 5, 6)),
+        table(HEAD, run_rows(result), (2, 3, 4, 5, 6, 7)),
     ]
     parts += folded(
         [

@@ -5,10 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from smajax.core.display_units import digits, display, label
-from smajax.core.wording import and_listed, per_cent, times_noise
+from smajax.core.wording import and_listed, of_those_moving, per_cent, times_noise
 from smajax.fit.prediction import Extrapolation, PredictedRun, Prediction
+from smajax.fit.prediction_band import MOVED, NEIGHBOURS
 from smajax.report.narrative.residual import residual_sentences
 
+MOVES = (
+    f"An output moves where the means of the {NEIGHBOURS} neighbours on either side of a sample differ by more than {MOVED:g} noises; at rest most models "
+    "are right."
+)
 LISTED = 3  # spans of time in a sentence
 LARGE_ZERO = 10.0  # noises: from here on a fitted zero is said in a sentence
 HEAD = (
@@ -19,6 +24,7 @@ HEAD = (
     "error over noise",
     "zero, fitted",
     "in the 90 % band",
+    "in it while moving",
     "unit",
     "remark",
 )
@@ -36,7 +42,8 @@ def conclusions(result: Prediction) -> list[str]:
         count = len(result.measured_runs(k))
         sentences.append(
             f"The {label(one.output)} of {count} run{'s' if count > 1 else ''} is predicted with an error (rms) of {size}, "
-            f"{times_noise(errors.rmse / one.noise, f'the noise of {noise}')}; {per_cent(errors.coverage)} of the samples lie in the 90 % band."
+            f"{times_noise(errors.rmse / one.noise, f'the noise of {noise}')}; {per_cent(errors.coverage)} of the samples lie in the 90 % band"
+            f"{of_those_moving(errors.coverage, errors.moving_coverage)}."
         )
         found = errors.residual
         if found is not None:
@@ -117,6 +124,7 @@ def run_rows(result: Prediction) -> list[tuple[str, ...]]:
                     digits(one.rmse / one.noise, 3) if known else "",
                     digits(unit.of(one.offset), 3) if known and one.offset else "",
                     per_cent(one.coverage) if known else "",
+                    per_cent(one.moving_coverage) if np.isfinite(one.moving_coverage) else "",
                     unit.unit,
                     ", ".join(remarks),
                 )

@@ -47,6 +47,8 @@ def test_nine_of_ten_samples_of_fresh_runs_lie_in_the_band(fitted: tuple[Search,
     found = averaged(setting, search, final, _fresh_runs())
     inside = np.mean([run.coverage for run in found.runs])
     assert inside == pytest.approx(BAND, abs=0.05)
+    assert all(0 < run.moving_samples < run.samples for run in found.runs)
+    assert np.mean([run.moving_coverage for run in found.runs]) == pytest.approx(BAND, abs=0.07)
     assert np.sqrt(np.mean([run.rmse**2 for run in found.runs])) == pytest.approx(NOISE, rel=0.1)
     assert sum(one.weight for one in found.models) == pytest.approx(1.0)
 

@@ -17,8 +17,9 @@ from smajax.data.model_file.actuator_model import ActuatorModel
 from smajax.data.model_file.of_presets import model_of_presets
 from smajax.data.model_file.record import FittedRun, LikelyModel, ModelOutput
 from smajax.fit.predict import Prediction
-from smajax.fit.prediction_band import averaged_band
-from smajax.report.predict_page import page
+from smajax.fit.prediction_band import averaged_band, moving
+from smajax.report.csv_files import predicted_runs
+from smajax.report.predict_page import page, record
 from smajax.report.predict_words import HEAD, conclusions, run_rows
 from tests.helpers.often import often
 from tests.helpers.small_bench import bench, smajax, table
@@ -130,6 +131,38 @@ def test_the_offset_of_an_average_of_models_is_the_average_of_theirs(tmp_path: P
     assert abs(alone[1] - alone[0]) > 2.0 * NOISE
     both = offset(dataclasses.replace(first, probability=0.6), other)
     assert both == pytest.approx(0.6 * alone[0] + 0.4 * alone[1], rel=1e-9)
+
+
+def test_an_output_moves_where_its_means_before_and_after_a_sample_differ_by_more_than_two_noises() -> None:
+    random = np.random.default_rng(3)
+    way = np.concatenate([np.zeros(5000), np.arange(100.0), np.full(5000, 100.0)])  # a noise a sample
+    moves = moving(way + random.normal(0.0, 1.0, way.size), 1.0)
+    assert moves[5005:5095].all()
+    at_rest = np.concatenate([moves[:4990], moves[5110:]])
+    assert 0.0 < np.mean(at_rest) < 0.005
+    lost = np.where(np.arange(way.size) % 7 == 0, np.nan, way)
+    assert not moving(lost, 1.0)[::7].any()
+    assert not moving(np.full(20, np.nan), 1.0).any()
+    assert not moving(np.array([1.0]), 1.0).any()
+
+
+def test_samples_at_rest_do_not_hide_that_a_model_is_wrong_where_its_output_moves(tmp_path: Path) -> None:
+    """A wire that cools a third more slowly is where the model says as long as nothing happens."""
+    model = kept_model()
+    result = sma.predict(model, log(tmp_path / "run.csv", reading(model, convection_coefficient=70.0)))
+    one = result.runs[0].series[0]
+    assert one.moving_coverage < one.coverage - 0.1
+    assert result.errors[0].moving_coverage == one.moving_coverage
+    share = round(100 * one.moving_coverage)
+    assert (
+        f" of the samples lie in the 90 % band ({share}% of those at which the output moves)." in conclusions(result)[0]
+    )
+    assert run_rows(result)[0][HEAD.index("in it while moving")] == f"{share}%"
+    inside = np.abs(one.measured - one.reading) <= one.half_width
+    assert np.mean(inside[one.moving]) == one.moving_coverage
+    assert record(result)["runs"][0]["outputs"]["position"]["band_coverage_moving"] == one.moving_coverage
+    assert predicted_runs(result).splitlines()[0].endswith("position moves [1]")
+    assert "differ by more than 2 noises" in page(result)
 
 
 def test_the_average_of_likely_models_lies_between_them_with_their_difference_in_the_band() -> None:

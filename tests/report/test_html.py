@@ -52,6 +52,16 @@ def test_the_first_screen_has_the_errors_before_and_after_and_how_the_band_does(
     before, after = (1e3 * pooled_rmse(findings.runs, "held-out", which) for which in ("before", "after"))
     assert shown["error on the held-out runs"] == f"{before:.3g} → {after:.3g} mm"
     assert shown["held-out samples in the 90 % band"] == "93%"
+    assert "of those at which the output moves" not in shown  # nothing is known of these
+    moving = dataclasses.replace(findings.runs[-1].average, moving_coverage=0.8, moving_samples=100)
+    told = dataclasses.replace(
+        findings, runs=(*findings.runs[:-1], dataclasses.replace(findings.runs[-1], average=moving))
+    )
+    assert "<dt>of those at which the output moves</dt><dd>80%</dd>" in findings_to_html(told)
+    assert any(
+        "93% of the samples lie in its 90 % band (80% of those at which the output moves)." in one
+        for one in narrate(told).summary
+    )
     without = dataclasses.replace(findings, runs=tuple(run for run in findings.runs if run.role == "fit"))
     plain = findings_to_html(without)
     assert "held-out" not in plain[plain.index("<dl") : plain.index("</dl>")]

@@ -11,6 +11,7 @@ from smajax.attribution.findings import (
     Role,
     Verdict,
     coverage,
+    moving_coverage,
     other_outputs,
     pooled,
     pooled_rmse,
@@ -18,7 +19,7 @@ from smajax.attribution.findings import (
 )
 from smajax.attribution.record_error import OutlierRun
 from smajax.core.display_units import label
-from smajax.core.wording import and_listed, per_cent
+from smajax.core.wording import and_listed, of_those_moving, per_cent
 from smajax.model.effects.library import LIBRARY
 from smajax.report.narrative import caveats
 from smajax.report.narrative.curve import curve_sentences
@@ -208,7 +209,8 @@ def _of_the_band(findings: Findings) -> list[str]:
     count = len(findings.averaged)
     who = f"the average of the {count} likely models" if count > 1 else "the model"
     return [
-        f"On the held-out runs {who} is off by {error_text(findings, error)}, and {per_cent(inside)} of the samples lie in its 90 % band.",
+        f"On the held-out runs {who} is off by {error_text(findings, error)}, and {per_cent(inside)} of the samples lie in its 90 % band"
+        f"{of_those_moving(inside, moving_coverage(findings))}.",
         *(
             f"{' + '.join(one.effects)}, of probability {one.weight:.2f}, is not averaged with: "
             f"{reason_text(one.reason, findings.output_unit, findings.output_name)}."
