@@ -201,6 +201,22 @@ def test_a_value_of_these_runs_that_no_run_of_the_fit_had_is_extrapolation(tmp_p
     assert any("Extrapolation in run: damping" in one for one in conclusions(result))
 
 
+def test_a_log_that_does_not_say_what_runs_of_the_fit_differed_in_gets_a_hint_at_the_option(tmp_path: Path) -> None:
+    model = kept_model()
+    path = log(tmp_path / "run.csv", reading(model))
+    ranges = {"mass": (0.05, 0.2), "ambient_temperature": (22.0, 22.0), "damping": (50.0, 1000.0)}
+    ranged = dataclasses.replace(model, fitted_range={**model.fitted_range, **ranges})
+    mass, damping = (one for one in sma.predict(ranged, path).warnings if "these runs do not say theirs" in one)
+    assert mass == (
+        "mass was 50 to 200 g in the runs that the model was fitted to, and these runs do not say theirs: 75 g is taken; give it with --input mass=..., "
+        "or in [[runs]] inputs"
+    )
+    assert "give it with --set damping=..., or in [[runs]] parameters" in damping
+    for told in ({"inputs": {"mass": "80 g"}}, {"parameters": {"load_mass": "80 g"}}):
+        notes = sma.predict(ranged, path, **told).warnings
+        assert not any(one.startswith("mass was") for one in notes), notes
+
+
 def test_a_run_that_the_model_was_fitted_to_is_said_to_be_one(tmp_path: Path) -> None:
     model = kept_model()
     path = log(tmp_path / "run.csv", reading(model))

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from smajax.core.display_units import digits, display
 from smajax.core.names import close_matches
 from smajax.core.units import parse_quantity
 from smajax.data.experiment.errors import ExperimentError
 from smajax.data.experiment.motion import motion_warnings
 from smajax.data.experiment.plausibility import role_warnings
 from smajax.data.experiment.record import RUN_STARTS, Experiment
-from smajax.data.model_file.record import ModelRecord
+from smajax.data.model_file.record import ModelRecord, range_unit
+from smajax.model.channels import REPLACED
 
 SAME = 1e-9  # of a value: a smaller difference is a unit's rounding
 
@@ -71,12 +73,24 @@ def _left_out(model: ModelRecord, experiment: Experiment) -> list[str]:
         if one.name in RUN_STARTS
     ]
     own = {name for run in experiment.runs for name in run.parameters}
-    notes += [
-        f"{name} was {low:.4g} to {high:.4g} {model.table[name].unit} in the runs that the model was fitted to, and these runs do not say "
-        f"theirs: {model.values[name]:.4g} is taken; give it with --set {name}=..., or in [[runs]] parameters"
-        for name, (low, high) in model.fitted_range.items()
-        if name in model.table and name not in own and low < high
-    ]
+    given = own | {name for run in experiment.runs for name in run.inputs}
+    replaced = {channel: name for name, channel in REPLACED.items()}
+    for name, (low, high) in model.fitted_range.items():
+        parameter = name if name in model.table and name not in replaced else replaced.get(name, "")
+        if not parameter or given & {name, parameter} or not low < high:
+            continue
+        unit = display(range_unit(name, model.table), name)
+        ends = f"{digits(unit.of(low), 4)} to {digits(unit.of(high), 4)} {unit.unit}".strip()
+        where = (
+            f"--input {name}=..., or in [[runs]] inputs"
+            if name in replaced
+            else f"--set {name}=..., or in [[runs]] parameters"
+        )
+        notes.append(
+            f"{name} was {ends} in the runs that the model was fitted to, and these runs do not say theirs: "
+            f"{digits(unit.of(model.values[parameter]), 4)} {unit.unit}".rstrip()
+            + f" is taken; give it with {where}"
+        )
     sampling = None if model.log_format is None else model.log_format.sampling
     if sampling is not None:
         step = parse_quantity(sampling.step, "s", bare="s")
