@@ -25,6 +25,27 @@ def test_a_unit_that_the_heading_contradicts_is_a_warning(bench: Path) -> None:
     ]
 
 
+@pytest.mark.parametrize(
+    ("heading", "said"),
+    [
+        ("position_degC", "degC"),
+        ("temp [degC]", "degC"),
+        ("T [C]", "C"),
+        ("force in N", "N"),
+        ("pos_s", ""),
+        ("x [ch1]", ""),
+    ],
+)
+def test_a_heading_with_a_unit_of_another_kind_is_asked_about(bench: Path, heading: str, said: str) -> None:
+    for name in ("a.csv", "b.csv"):
+        (bench / name).write_text((bench / name).read_text().replace("time,duty,pos", f"time,duty,{heading}", 1))
+    told = [text for text in load(changed(bench, '"pos"', f'"{heading}"')).warnings if "heading" in text]
+    assert told == [
+        f"channels.position.unit is 'mm', and the heading {heading!r} says {said}, a unit of another kind: is that the column? Its numbers are taken as "
+        "the file says"
+    ] * bool(said)
+
+
 def test_an_uneven_clock_is_a_warning(bench: Path) -> None:
     lines = (bench / "a.csv").read_text().splitlines()
     kept = [line for number, line in enumerate(lines) if number % 5 != 2 or number == 0]
