@@ -75,6 +75,21 @@ def written(unit: str, value: float) -> Display:
     return next(fitting, Display(unit, 1.0))
 
 
+def unit_meant(
+    number: float, unit: str, low: float = -math.inf, high: float = math.inf, near: float | None = None
+) -> str | None:
+    """The unit in which a bare number may have been meant, of a value given in `unit` that lies within low and high; None: none does.
+
+    `unit` itself or one that an engineer writes it in; of several the one whose value is nearest, in proportion, to `near`: 400 of a wire of
+    0.5 m are mm.
+    """
+    factors = {unit: 1.0, **{name: factor for name, factor, *_ in _WRITTEN.get(unit, ())}}
+    fitting = [name for name, factor in factors.items() if low <= number / factor <= high]
+    if not fitting or not near or not number / near > 0.0:
+        return fitting[0] if fitting else None
+    return min(fitting, key=lambda name: abs(math.log(number / factors[name] / near)))
+
+
 def digits(value: float | None, count: int = 4, zeros: bool = False) -> str:
     """`value` with `count` significant digits, trailing zeros kept if `zeros`; a dash where there is no number."""
     if value is None or not math.isfinite(value):

@@ -60,7 +60,7 @@ REFUSED: dict[str, tuple[tuple[str, str], str]] = {
     ),
     "no unit": (
         ("[unknown]", PARAMETERS.format("wire_diameter = 0.1")),
-        "got 0.1 without a unit, expected one like 'm'",
+        "got 0.1 without a unit, expected one like 'mm'; write '0.1 mm'",
     ),
     "a tower of powers": (
         ("[unknown]", PARAMETERS.format('wire_diameter = "1 m**9**9**9**9"')),

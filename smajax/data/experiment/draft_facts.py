@@ -10,6 +10,7 @@ from pathlib import Path
 from smajax.core.names import close_matches
 from smajax.core.units import UnitError, parse_quantity
 from smajax.core.wording import and_listed
+from smajax.data.experiment.bench_mass import parse_mass
 from smajax.data.experiment.catalogue import ModelDescription, ParameterInfo
 from smajax.data.experiment.draft_model import DraftModel
 from smajax.data.experiment.errors import ExperimentError, check_parameter
@@ -164,7 +165,7 @@ def _masses(
     for run, value in {**(dict.fromkeys(runs, facts.mass) if facts.mass else {}), **facts.masses}.items():
         key = f"runs.{run}.inputs.mass"
         try:
-            number = parse_quantity(value, model.input_units["mass"])
+            number = parse_mass(value)
         except UnitError as error:
             raise ExperimentError(path, key, str(error)) from None
         if not number > 0.0:

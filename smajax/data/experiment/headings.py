@@ -27,8 +27,9 @@ def heading_warnings(
         where = {name: f"runs.{run.name}.units.{name}" for name in {**run.columns, **run.units}}
     keys = [(key, places[name].column, places[name].unit) for name, key in where.items()]
     result = []
-    for key, heading, declared in keys:
-        said = unit_in(heading) if isinstance(heading, str) else ""
+    for key, column, declared in keys:
+        heading = column if isinstance(column, str) else ""
+        said = unit_in(heading)
         if said in ("", "-", "1"):  # a plain number: of a log in per cent as often as not
             continue
         try:

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from smajax.core.units import convert, parse_quantity
+from smajax.data.experiment.bench_mass import parse_mass
 from smajax.data.experiment.column_guess import TIME
 from smajax.data.experiment.column_overrides import own_columns
 from smajax.data.experiment.errors import ExperimentError, at_key
@@ -248,7 +249,7 @@ def _kept(path: Path, run: RunSection, start: float, end: float, unit: str) -> t
 
 def _constant(name: str, value: str | float, unit: str) -> float:
     """An input that a run holds. Raises UnitError, and MeasuredDataError for what it cannot be."""
-    result = parse_quantity(value, unit)
+    result = parse_mass(value) if unit == "kg" else parse_quantity(value, unit)
     check_readings(name, True, np.asarray([result]), lambda _: f"got {value!r}")
     return result
 

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from smajax.core.display_units import unit_meant
 from smajax.core.units import parse_quantity
 from smajax.core.wording import and_listed
 from smajax.data.experiment.catalogue import ModelDescription, ParameterInfo
 from smajax.data.experiment.errors import ExperimentError, at_key, check_parameter
 from smajax.data.experiment.record import RUN_STARTS, Prior, Unknown
 from smajax.data.experiment.schema import BoxSection, ExperimentFile, PriorSection
-from smajax.data.experiment.toml_file import Quantity
+from smajax.data.experiment.toml_file import Quantity, quantity
 
 CELSIUS = ParameterInfo("degC", -273.15, 1500.0)  # of a wire as a run starts, which no parameter says
 START = "initial_temperature"
@@ -19,8 +21,17 @@ START = "initial_temperature"
 
 def bounded(path: Path, key: str, value: Quantity, info: ParameterInfo) -> float:
     """One parameter value in the program's own unit, inside what makes physical sense."""
+    bare = _bare(value)
+    meant = None if bare is None else unit_meant(bare, info.unit, info.low, info.high, info.preset)
+    if bare is not None and meant is None and info.unit not in ("-", "1"):
+        like = quantity(info.low if info.preset is None else float(f"{info.preset:.3g}"), info.unit)
+        raise ExperimentError(
+            path,
+            key,
+            f"got {value!r} without a unit; expected {info.low:g} to {info.high:g} {info.unit}, written like {like!r}",
+        )
     with at_key(path, key):
-        number = parse_quantity(value, info.unit)
+        number = parse_quantity(value, info.unit, offered=meant or "")
     if not info.low <= number <= info.high:
         raise ExperimentError(
             path,
@@ -28,6 +39,15 @@ def bounded(path: Path, key: str, value: Quantity, info: ParameterInfo) -> float
             f"got {value!r}, that is {number:g} {info.unit}; expected {info.low:g} to {info.high:g} {info.unit}",
         )
     return number
+
+
+def _bare(value: Quantity) -> float | None:
+    """A finite number without a unit; None of other text."""
+    try:
+        number = float(value)
+    except ValueError:
+        return None
+    return number if math.isfinite(number) else None
 
 
 def _presets(file: ExperimentFile) -> str:
