@@ -28,6 +28,7 @@ from smajax.data.experiment.draft_parameters import PresetLine, kept_parameters,
 from smajax.data.experiment.first_force import first_force
 from smajax.data.experiment.grouping import RunFiles
 from smajax.data.experiment.logs import Logs, Requested, logs_of
+from smajax.data.experiment.sample_rates import rates_messages
 from smajax.data.experiment.toml_file import toml_value
 from smajax.data.model_file.read import load_model
 from smajax.data.readers.read import read_table
@@ -265,7 +266,7 @@ def _time(inputs: _Inputs) -> _Section:
     irregular = any(np.ptp(np.diff(clock)) > 0.5 * period for clock, period in zip(clocks, periods, strict=True))
     lines += ["[sampling]  # the clock to which all signals are resampled", f'step = "{1e3 * step:g} ms"', ""]
     message = f"sampling: every {usual:.4g} s{', irregular' if irregular else ''}; the clock of the fit: {step:g} s ({LIKELY})"
-    return _Section(lines, [message])
+    return _Section(lines, [message, *rates_messages([file.name for file in inputs.files], periods)])
 
 
 def _no_time(tables: Sequence[Table]) -> _Section:
