@@ -76,7 +76,7 @@ def noise_of_file(model: ModelRecord | None) -> NoiseOfModelFile | None:
     own = next((one for one in model.outputs if (one.name, one.unit) == (name, unit)), None)
     if own is None or not own.noise:
         return None
-    if own.reading_noise is None or own.reading_noise <= own.noise:
+    if own.reading_noise is None:
         return NoiseOfModelFile(own.noise, name, unit)
     return NoiseOfModelFile(own.reading_noise, name, unit, own.noise)
 

@@ -27,7 +27,7 @@ class NoiseOfModelFile:
     noise: float  # standard deviation, in `unit`
     reading: str
     unit: str  # rad or m
-    of_sample: float | None = None  # where a sample of the fit averages several readings: its noise
+    of_sample: float | None = None  # of a sample of the fit, which averages several readings, or whose noise was fitted
 
 
 @dataclass(frozen=True)

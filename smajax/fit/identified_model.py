@@ -63,6 +63,9 @@ def _outputs(setup: Setup, fitted: Fitted, runs: Sequence[IdentifiedRun]) -> lis
         error = error[np.isfinite(error)]
         missed = rounded(float(np.quantile(error, BAND))) if error.size else None
         sigma = float(fitted.problem.noise[k, 0])
-        single = None if output.reading_sigma is None else rounded(max(output.reading_sigma, sigma))
-        result.append(ModelOutput(output.name, output.unit, rounded(sigma), output.offset, missed, single))
+        # A noise that was fitted holds what the model lacks too.
+        single = output.reading_sigma or (output.noise_sigma if fitted.noise_estimated[k] else None)
+        result.append(
+            ModelOutput(output.name, output.unit, rounded(sigma), output.offset, missed, single and rounded(single))
+        )
     return result

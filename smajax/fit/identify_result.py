@@ -60,7 +60,17 @@ class IdentifiedOutput:
     noise_sigma: float
     noise_how: str
     noise_before: float | None  # where it is estimated with the fit: as estimated before, from differences of samples
-    ratio: float  # rms of the fit runs' residual over the noise
+    ratio: float  # rms of the fit runs' residual over the noise of the fit
+
+    @property
+    def over_noise(self) -> float:
+        """The same over the noise that neighbouring samples show, or that was given: a noise from the fit is the residual itself."""
+        return self.ratio * self.fitted_over_shown
+
+    @property
+    def fitted_over_shown(self) -> float:
+        """Noise of the fit over that of neighbouring samples; 1 where it was not fitted."""
+        return self.noise_sigma / (self.noise_before or self.noise_sigma)
 
 
 @dataclass(frozen=True)
@@ -110,7 +120,7 @@ class Identified:
     profiles: tuple[Profile, ...]
     posterior: Posterior | None
     start_costs: tuple[float, ...]  # mean square over the noise's, of every fit that was run until its end
-    ratio: float  # rms of the fit runs' residual over the noise
+    ratio: float  # rms of the fit runs' residual over the noise of the fit
     whiteness_p: float
     normality_p: float
     independent: float  # samples an independent one
@@ -124,6 +134,15 @@ class Identified:
     held_presets: tuple[str, ...] = ()  # values that the file does not give, held at the presets'
     fitted_presets: tuple[str, ...] = ()  # values that the file does not give and that were fitted too
     model: ActuatorModel | None = None  # as it is saved
+
+    @property
+    def over_noise(self) -> float:
+        """Rms of the fit runs' residual over the noise that neighbouring samples show, or that was given; of all outputs together."""
+        if len(self.outputs) == 1:
+            return self.ratio * self.outputs[0].fitted_over_shown
+        fit = [run for run in self.runs if run.role == "fit"]
+        counts = [sum(int(np.isfinite(run.series[k].measured).sum()) for run in fit) for k in range(len(self.outputs))]
+        return float(np.sqrt(np.average([one.over_noise**2 for one in self.outputs], weights=counts)))
 
     @property
     def stopped(self) -> str:

@@ -48,7 +48,7 @@ def record(result: Identified) -> dict[str, Any]:
             "robust": result.robust,
         },
         "residual": {
-            "rms_over_noise": result.ratio,
+            "rms_over_noise": result.over_noise,
             "whiteness_p_value": result.whiteness_p,
             "normality_p_value": result.normality_p,
             "samples_an_independent_one": result.independent,
@@ -60,7 +60,7 @@ def record(result: Identified) -> dict[str, Any]:
                 "unit": one.unit,
                 "noise_sigma": one.noise_sigma,
                 "noise_how": one.noise_how,
-                "rms_over_noise": one.ratio,
+                "rms_over_noise": one.over_noise,
                 "rmse": rms_by_role(result, k),
             }
             for k, one in enumerate(result.outputs)

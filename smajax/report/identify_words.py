@@ -91,6 +91,7 @@ def conclusions(result: Identified) -> list[str]:
         ended_sentence(result.ended),
         *(_error(result, k) for k in range(len(result.outputs))),
     ]
+    larger = [one for one in result.outputs if one.noise_before and one.noise_sigma > OFF * one.noise_before]
     given = [one.noise_before is None for one in result.outputs]
     if not all(np.isfinite(one.ratio) for one in result.outputs):
         sentences.append("The residual of these runs is NaN or infinite: neither it nor the values mean anything.")
@@ -103,7 +104,7 @@ def conclusions(result: Identified) -> list[str]:
     else:
         sentences.append(
             f"The residual is {_times(result)} and is white "
-            f"({p_value(result.whiteness_p)}): nothing in these runs speaks against the model."
+            f"({p_value(result.whiteness_p)}){'' if larger else ': nothing in these runs speaks against the model'}."
         )
         wrong = [
             one
@@ -117,7 +118,6 @@ def conclusions(result: Identified) -> list[str]:
                 f"The noise of {and_listed([one.name for one in wrong])} is not what was declared, so the outputs do not "
                 "have the weights they deserve: write noise = 'estimate' for it."
             )
-    larger = [one for one in result.outputs if one.noise_before and one.noise_sigma > OFF * one.noise_before]
     if larger:
         sentences.append(
             f"The residual of {and_listed([one.name for one in larger])} is larger than the noise that the signal "
@@ -171,8 +171,8 @@ def ended_sentence(end: FitEnd) -> str:
 def _times(result: Identified) -> str:
     """`1.1 times the noise`, or by output where the fit did not make it one."""
     if len(result.outputs) == 1:
-        return times_noise(result.ratio)
-    return and_listed([f"{times_noise(one.ratio)} ({one.name})" for one in result.outputs])
+        return times_noise(result.over_noise)
+    return and_listed([f"{times_noise(one.over_noise)} ({one.name})" for one in result.outputs])
 
 
 def _contradicted(one: Estimate) -> str:

@@ -71,9 +71,7 @@ def source_sentence(source: Source | None) -> str:
         case NoiseOfModelFile(noise, reading, unit, of_sample):
             shown = display(unit, reading)
             said, sample = (f"{digits(shown.of(one or 0.0), 3)} {shown.unit}" for one in (noise, of_sample))
-            single = (
-                f" of a single reading (a sample of its fit, which averages several, has {sample})" if of_sample else ""
-            )
+            single = f" of a single reading (a sample of its fit has {sample})" if of_sample else ""
             return f"The sensor has the noise of the model file, {said} (1 sigma){single}; --noise gives another one, --noise 0 none."
         case PresetGains(controller, scaled):
             how = ", scaled from the arm to this load's stroke, force and time" if scaled else ""

@@ -174,7 +174,7 @@ def test_a_loop_reads_its_sensor_once_where_a_sample_of_the_fit_averages_several
     assert source is not None
     assert source.noise == 3e-4
     assert source_sentence(source).startswith(
-        "The sensor has the noise of the model file, 0.3 mm (1 sigma) of a single reading (a sample of its fit, which averages several, has 0.1 mm);"
+        "The sensor has the noise of the model file, 0.3 mm (1 sigma) of a single reading (a sample of its fit has 0.1 mm);"
     )
 
 

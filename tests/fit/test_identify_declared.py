@@ -156,6 +156,29 @@ def test_a_second_sensor_narrows_the_errors_and_the_noise_of_each_is_found(tmp_p
     assert page(alone).count("data:image/png") == 3 + 1
 
 
+def test_a_residual_is_held_against_the_noise_of_neighbours_where_its_own_was_fitted(tmp_path: Path) -> None:
+    """Over the noise that was fitted every residual is 1; here two runs have two strains, and the model has one."""
+    estimate = 'noise = "estimate"\n'
+    odd = _found(
+        tmp_path,
+        unknown_section() + STRAIN + estimate + OHMS + estimate,
+        own={"a": {"recoverable_strain": 0.048}, "b": {"recoverable_strain": 0.042}},
+    )
+    strain = odd.outputs[0]
+    assert strain.ratio == pytest.approx(1.0, abs=0.02)
+    assert strain.over_noise > 2.0
+    told = record(odd)
+    assert told["outputs"]["strain"]["rms_over_noise"] == strain.over_noise
+    assert 1.0 < told["residual"]["rms_over_noise"] < strain.over_noise
+    text = " ".join(conclusions(odd))
+    assert f"The residual is {strain.over_noise:.2g} times the noise (strain) and " in text
+    assert "speaks against the model" not in text
+    # A loop has the sensor's noise, and not what the model lacks.
+    assert odd.model is not None
+    assert odd.model.outputs[0].noise == pytest.approx(strain.noise_sigma, rel=1e-5)
+    assert odd.model.outputs[0].reading_noise == pytest.approx(strain.noise_before, rel=1e-5)
+
+
 def test_a_sensor_counts_by_its_noise(tmp_path: Path) -> None:
     """Resistance whose noise is declared a hundred times too large tells nothing beside the strain."""
     alone = _found(tmp_path, unknown_section() + STRAIN + KNOWN)

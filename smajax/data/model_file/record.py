@@ -82,7 +82,7 @@ class ModelOutput:
     """A sensor that the model was fitted to, SI. noise: sigma of a sample. offset: whether each run has its own zero.
 
     prediction_error: what nine of ten samples of runs that the fit had not seen stay within; None where none was left out. reading_noise: sigma of
-    a single reading, where a sample averages several, else None.
+    a single reading, where a sample averages several or its noise was fitted (it then holds what the model lacks), else None.
     """
 
     name: str

@@ -62,7 +62,9 @@ def model_text(model: ModelRecord, uncertainty: str = "", sha256: str = "") -> s
         lines += ["", f"[outputs.{toml_key(output.name)}]", f"noise = {_quantity(output.noise, output.unit)}"]
         if output.reading_noise is not None:
             noise = _quantity(output.reading_noise, output.unit)
-            lines.append(f"reading_noise = {noise}  # of a single reading: a sample of the fit averages several")
+            lines.append(
+                f"reading_noise = {noise}  # of a single reading, by its neighbours: the noise of a sample is that of the fit"
+            )
         lines.append(f"offset = {toml_value(output.offset)}  # whether each run has its own zero")
         if output.prediction_error is not None:
             error = _quantity(output.prediction_error, output.unit)
