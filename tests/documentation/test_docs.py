@@ -71,6 +71,15 @@ def test_the_first_example_of_the_readme_prints_the_output_shown(tmp_path: Path)
     run(ROOT / "README.md", tmp_path, only="np.full(2001, 8.0)")
 
 
+@pytest.mark.parametrize(
+    "page", [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))], ids=lambda page: str(page.relative_to(ROOT))
+)
+def test_an_example_that_begins_says_the_precision(page: Path) -> None:
+    """In the single precision of JAX's default a fit is an error and a simulation loses half of its digits."""
+    begun = [text for language, _, text, _ in blocks(page) if language == "python" and "import smajax as sma" in text]
+    assert not begun or "prepare()" in begun[0] or "jax_enable_x64" in begun[0]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("page", "only"),
