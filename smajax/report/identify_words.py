@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from smajax.fit.identify_result import Estimate, FitEnd, Identified
 from smajax.fit.levenberg_marquardt import Status
 from smajax.fit.posterior import Posterior
 from smajax.fit.uncertainty import clusters
+from smajax.report.effect_words import sign_sentences
 from smajax.report.identifiability_words import remark_text
 from smajax.report.range_words import range_sentences
 
@@ -128,6 +130,7 @@ def conclusions(result: Identified) -> list[str]:
             f"It is not normally distributed ({p_value(result.normality_p)}): if single samples are far off, fit by Huber's "
             "loss (`--robust`)."
         )
+    sentences += of_effects(result.estimates)
     if result.model is not None:
         sentences += range_sentences(result.model.values)
     sentences += [said for one in result.estimates if (said := _contradicted(one))]
@@ -150,6 +153,16 @@ def conclusions(result: Identified) -> list[str]:
     if result.robust:
         sentences.append("Huber's loss: samples far off count less, and errors are those of that estimate.")
     return sentences
+
+
+def of_effects(estimates: Sequence[Estimate]) -> list[str]:
+    """What coefficients of effects among the estimates say by their sign."""
+    by_effect: dict[str, dict[str, tuple[float, float | None]]] = {}
+    for one in estimates:
+        effect, dot, coefficient = one.name.partition(".")
+        if dot:
+            by_effect.setdefault(effect, {})[coefficient] = (one.value, one.standard_error)
+    return [said for effect, fitted in by_effect.items() for said in sign_sentences(effect, fitted)]
 
 
 def ended_sentence(end: FitEnd) -> str:

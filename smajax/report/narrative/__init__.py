@@ -17,6 +17,7 @@ from smajax.core.progress import Event, Message, Progress, Result
 from smajax.fit.identifiability import Checks
 from smajax.fit.identify_result import Identified
 from smajax.model.effects.library import LIBRARY
+from smajax.report.effect_words import meaning
 from smajax.report.identifiability_words import check_events, check_sentences
 from smajax.report.narrative.identification import IdentificationNarrative, of_identified
 from smajax.report.narrative.limits import cannot_know
@@ -83,7 +84,9 @@ def narrate(findings: Findings | Identified | TuneSettings) -> Narrative | Ident
         dropped=tuple(reason_text(one.reason, findings.output_unit, findings.output_name) for one in findings.dropped),
         unknown=tuple(comparison_sentence(findings, term) for term in findings.unknown),
         effects={
-            effect.name: LIBRARY[effect.name].candidate.sentence
+            effect.name: meaning(
+                effect.name, {name: (one.value, one.standard_error) for name, one in effect.coefficients.items()}
+            )
             for effect in findings.effects
             if effect.name in LIBRARY
         },

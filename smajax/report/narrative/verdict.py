@@ -20,7 +20,7 @@ from smajax.attribution.findings import (
 from smajax.attribution.record_error import OutlierRun
 from smajax.core.display_units import label
 from smajax.core.wording import and_listed, of_those_moving, per_cent
-from smajax.model.effects.library import LIBRARY
+from smajax.report.effect_words import meaning, sign_sentences
 from smajax.report.narrative import caveats
 from smajax.report.narrative.curve import curve_sentences
 from smajax.report.narrative.record_errors import of_wrong_records
@@ -72,9 +72,14 @@ def summary(findings: Findings) -> tuple[str, ...]:
     for effect in findings.added:
         if effect in unnamed:
             continue
-        meaning = caveats.of_the_preset(findings, effect) or LIBRARY[effect.name].candidate.sentence
-        values = {name: one.value for name, one in effect.coefficients.items()}
-        sentences += [meaning, *curve_sentences(effect.name, values), *caveats.of_a_size(findings, effect)]
+        fitted = {name: (one.value, one.standard_error) for name, one in effect.coefficients.items()}
+        values = {name: value for name, (value, _) in fitted.items()}
+        sentences += [
+            caveats.of_the_preset(findings, effect) or meaning(effect.name, fitted),
+            *sign_sentences(effect.name, fitted),
+            *curve_sentences(effect.name, values),
+            *caveats.of_a_size(findings, effect),
+        ]
     sentences += caveats.held_out_warnings(findings)
     sentences += caveats.of_a_faint_trace(findings)
     sentences += caveats.of_unlike_outputs(findings)
