@@ -20,6 +20,7 @@ from smajax.core.display_units import digits
 from smajax.core.operating_system import as_typed
 from smajax.data.experiment.draft_model import GUESSED, loads_with
 from smajax.data.model_file.actuator_model import ActuatorModel
+from smajax.data.model_file.its_experiment import experiment_of_model
 from smajax.fit.identify_result import Identified
 from smajax.model.system import System
 
@@ -162,16 +163,31 @@ def after_identify(result: Identified, folder: Path, experiment: str) -> list[St
 
 def after_predict(model: ActuatorModel, path: str, logs: Sequence[str]) -> list[Step]:
     """path: of the model file. logs: of the runs that were predicted, or an experiment file."""
-    steps = []
-    if not any(log.endswith(".toml") or Path(log).is_dir() for log in logs):
-        again = command("new-experiment", *logs, "--model", path, "--out", "again.toml")
-        steps.append(Step("Where the error is too large: fit the model again, to these runs too", again))
+    own = not any(log.endswith(".toml") or Path(log).is_dir() for log in logs)
+    steps = _again(model, path, logs) if own else []
     return [
         *steps,
         *_tuning(Path(path), model.system),
         Step(TO_EXPORT, command("export", path, "--to", "fmu", "--out", "actuator.fmu")),
         _in_python(Path(path)),
     ]
+
+
+def _again(model: ActuatorModel, path: str, logs: Sequence[str]) -> list[Step]:
+    """A fit to these logs and to the runs of before, whose experiment file is looked for; where it is not there, from the model that they left."""
+    found = experiment_of_model(model, Path(path))
+    if found is None:
+        again = command("new-experiment", *logs, "--model", path, "--out", "again.toml")
+        what = "fit the model again, to these runs, with its values and their errors in the place of the runs of before"
+        return [Step(f"Where the error is too large, {what}", again)]
+    experiment, known = found
+    new = [log for log in logs if Path(log).resolve() not in known]
+    if not new:
+        return []
+    extended = command(
+        "new-experiment", *new, "--with-runs-of", experiment, "--out", experiment.with_name("again.toml")
+    )
+    return [Step("Where the error is too large, fit the model again, to the runs of before and these", extended)]
 
 
 def after_simulate(result: RunResult, plant: PlantWords, gains: str = "") -> list[Step]:

@@ -15,14 +15,17 @@ import numpy as np
 import pytest
 import typer
 
+import smajax as sma
 from smajax.attribution.findings import Remaining
 from smajax.cli.main import app
 from smajax.control.run_request import RunRequest, run_open
 from smajax.data.model_file.of_presets import model_of_presets
+from smajax.data.model_file.record import FittedRun
 from smajax.report import next_steps
 from smajax.report.next_steps import ARM, PlantWords, Step
 from smajax.report.write import write_report
 from tests.helpers.made_findings import made_findings
+from tests.helpers.small_bench import bench, log, refused, smajax
 
 FOLDER = Path("my bench/report")
 SPRING = PlantWords(("flexinol_ht_500um", "bias_spring", "voltage"), values=("wire_length='1 m'",))
@@ -80,6 +83,57 @@ def test_no_controller_is_suggested_for_what_does_not_move() -> None:
     found = read(next_steps.after_predict(blocked, "report/model.toml", ["logs/a b.csv", "logs/c.csv"]))
     assert [one["command"] for one in found] == ["new-experiment", "export"]
     assert found[0]["files"] == [Path("logs/a b.csv"), Path("logs/c.csv")]
+
+
+def test_a_model_is_fitted_again_to_the_runs_of_before_too_where_their_file_is_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = bench(tmp_path / "mine")
+    new, held_out = log(tmp_path / "mine" / "c.csv", seed=3), tmp_path / "mine" / "b.csv"
+    model = dataclasses.replace(
+        model_of_presets("flexinol_table_3_2", "dead_weight", "voltage"),
+        made_with={"experiment": "experiment.toml"},
+        runs=(FittedRun("A", "fit", ""), FittedRun("B", "held-out", "")),
+    )
+    kept = str(tmp_path / "mine" / "model.toml")
+    (again, *_) = read(next_steps.after_predict(model, kept, [str(held_out), str(new)]))
+    assert (again["files"], again["runs_of"].resolve(), again["out"].name) == ([new], file, "again.toml")
+    assert smajax("new-experiment", new, "--with-runs-of", file, "--out", file.with_name("again.toml")).code == 0
+    extended = sma.load_experiment(file.with_name("again.toml"))
+    assert [(one.name, one.role) for one in extended.runs] == [("A", "fit"), ("B", "held-out"), ("c", "fit")]
+    assert file.with_name("again.toml").read_text().startswith(file.read_text().rstrip())
+    # Of the runs of the file alone there is nothing to add; without its file the model stands for the old runs, which is said.
+    assert "new-experiment" not in [
+        one["command"] for one in read(next_steps.after_predict(model, kept, [str(held_out)]))
+    ]
+    step = next_steps.after_predict(model, str(tmp_path / "elsewhere" / "model.toml"), [str(new)])[0]
+    assert "in the place of the runs of before" in step.what
+    assert "--model" in step.command
+
+
+@pytest.mark.parametrize(
+    ("logs", "said"),
+    [
+        (["mine/a.csv"], "is the log of run 'A'"),
+        (["mine/A.csv"], "has a run of that name"),
+        (["c.csv"], "is out of the data folder"),
+    ],
+)
+def test_a_log_that_cannot_be_added_is_refused(tmp_path: Path, logs: list[str], said: str) -> None:
+    file = bench(tmp_path / "mine")
+    for name in logs:
+        if not (tmp_path / name).exists():
+            log(tmp_path / name, seed=3)
+    out = file.with_name("again.toml")
+    words = [str(tmp_path / name) for name in logs]
+    assert said in refused("new-experiment", *words, "--with-runs-of", file, "--out", out)
+    assert "is in another folder" in refused(
+        "new-experiment", *words, "--with-runs-of", file, "--out", tmp_path / "e.toml"
+    )
+    assert "leave their options out" in refused(
+        "new-experiment", *words, "--with-runs-of", file, "--load", "arm", "--out", out
+    )
+    assert not out.exists()
 
 
 @pytest.mark.parametrize("plant", [ARM, SPRING, FITTED])

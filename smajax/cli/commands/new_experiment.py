@@ -65,6 +65,13 @@ def new_experiment(
             help="hanging mass where no column has it: '500 g' of all runs, RUN='1 kg' of one; may be repeated",
         ),
     ] = None,
+    runs_of: Annotated[
+        Path | None,
+        typer.Option(
+            "--with-runs-of",
+            help="an experiment file whose text and runs are kept, with these logs as further fit runs of the same columns; --out is beside it",
+        ),
+    ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="replace an existing file")] = False,
     json_out: Json = False,
 ) -> None:
@@ -75,9 +82,16 @@ def new_experiment(
 
     Example:  smajax new-experiment logs/steps.csv logs/triangle.csv logs/pulses.csv logs/ramp.csv --out experiment.toml
 
+    Example:  smajax new-experiment logs/ramp.csv --with-runs-of experiment.toml --out again.toml
+
     Example:  smajax new-experiment logs/*.csv --known wire_length='0.5 m',wire_diameter='0.31 mm' --ohms 4.2ohm --mass ramp='500 g'
     """
     _check_options(out, overwrite, model is not None and bool(load or wire or drive))
+    others_given = (title, load, wire, drive, model, decimal, known, ohms, ohms_per_metre)
+    if runs_of is not None and any(others_given):
+        raise typer.BadParameter(
+            "says title, model, columns and values itself: leave their options out.", param_hint="--with-runs-of"
+        )
     given, (masses, others) = texts("--known", known, KNOWN), _masses(mass or ())
     from smajax.core.runtime import prepare
 
@@ -86,9 +100,14 @@ def new_experiment(
     from smajax.data.experiment.draft import draft
     from smajax.data.experiment.draft_facts import BenchFacts
     from smajax.data.experiment.draft_model import ModelChoice
+    from smajax.data.experiment.extend import extended
 
     bench = BenchFacts(given, ohms, ohms_per_metre, masses, others)
-    result = draft(files, out, title, ModelChoice(load, wire, drive, model), decimal, bench)
+    result = (
+        draft(files, out, title, ModelChoice(load, wire, drive, model), decimal, bench)
+        if runs_of is None
+        else extended(runs_of, files, out, masses, others)
+    )
     loaded = write_draft(result, out)
     if json_out:
         record = {
@@ -101,7 +120,7 @@ def new_experiment(
         }
         typer.echo(json.dumps(record))
     else:
-        _print(result.messages, loaded, out)
+        _print(result.messages, loaded, out, ranked=runs_of is None)
     if loaded.reason:
         raise typer.Exit(UNMET)
 
@@ -132,7 +151,8 @@ def _masses(several: Sequence[str]) -> tuple[dict[str, str], str]:
     return result, result.pop("", "")
 
 
-def _print(messages: Sequence[str], loaded: DraftFile, out: Path) -> None:
+def _print(messages: Sequence[str], loaded: DraftFile, out: Path, ranked: bool) -> None:
+    """ranked: whether the file lists what was left to the presets by its influence."""
     from smajax.report.preset_words import NO_NUMBER, NOT_LOADED, sentence
 
     for line in messages:
@@ -141,8 +161,8 @@ def _print(messages: Sequence[str], loaded: DraftFile, out: Path) -> None:
         typer.echo(f"  warning: {line}")
     if loaded.reason:
         typer.echo(f"It cannot be loaded yet: {loaded.reason}")
-    ranked = NOT_LOADED if loaded.reason else NO_NUMBER if loaded.ranking is None else sentence(loaded.ranking)
-    typer.echo(ranked)
+    if ranked:
+        typer.echo(NOT_LOADED if loaded.reason else NO_NUMBER if loaded.ranking is None else sentence(loaded.ranking))
     typer.echo(f"Written: {out.resolve()}")
     if not loaded.reason:
         typer.echo(f"Next: check it, then `smajax close-loop {out} --out report`")
