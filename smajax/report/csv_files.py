@@ -10,6 +10,7 @@ import numpy as np
 from smajax.attribution.findings import Findings, ParameterFinding
 from smajax.core.files import csv_text, heading
 from smajax.core.names_of_runs import is_of_run, of_run, parameter_of
+from smajax.fit.prediction_band import moving
 from smajax.model.channels import INPUT_UNITS
 from smajax.report.identifiability_words import remark_text
 
@@ -44,16 +45,18 @@ def _fitted(result: ParameterFinding | None) -> list[float | None]:
 
 
 def findings_runs(findings: Findings) -> str:
-    """Inputs, measurement and both models of every run, one after another."""
+    """Inputs, measurement, both models, and whether the output moves, of every run, one after another."""
     models = ("measured", "before", "after")
     units = dict.fromkeys(models, findings.output_unit)
     series = []
     for run in findings.runs:
         columns = {"time": run.time, **run.inputs, **{name: getattr(run, name) for name in models}}
+        columns["moves"] = moving(run.measured, findings.noise_sigma)
         for one in run.others:
             for name in models:
                 units[f"{one.name} {name}"] = one.unit
                 columns[f"{one.name} {name}"] = getattr(one, name)
+            columns[f"{one.name} moves"] = moving(one.measured, one.noise_sigma)
         series.append((run.name, run.role, columns))
     return _runs(series, units)
 

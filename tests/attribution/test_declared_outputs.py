@@ -151,6 +151,7 @@ def test_page_record_and_table_have_every_output(found: Findings) -> None:
     assert any(sentence.startswith("Error of the resistance: ") for sentence in narrate(found).summary)
     head = findings_runs(found).splitlines()[0]
     assert "resistance measured" in head
+    assert "resistance moves" in head
     page = findings_to_html(found)
     assert "The other outputs" in page
     assert "resistance: measured − model" in page

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from smajax.data.readers.read import read_table
+from smajax.fit.prediction_band import moving
 from smajax.report.write import write_report
 
 
@@ -38,6 +39,9 @@ def test_the_tables_are_those_of_the_record_and_can_be_read_back(findings, folde
             table.column(f"{name} [m]"), np.concatenate([getattr(run, name) for run in findings.runs]), rtol=1e-9
         )
     np.testing.assert_allclose(table.column("voltage [V]")[:1200], findings.runs[0].inputs["voltage"], rtol=1e-9)
+    moves = np.concatenate([moving(run.measured, findings.noise_sigma) for run in findings.runs])
+    assert 0.0 < moves.mean() < 1.0
+    np.testing.assert_array_equal(table.column("moves [1]"), moves)
     with (folder / "parameters.csv").open(encoding="utf-8") as file:
         rows = {row["parameter"]: row for row in csv.DictReader(file)}
     assert float(rows["latent_heat.enthalpy"]["after"]) == 24187.3
