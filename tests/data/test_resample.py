@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -102,7 +104,38 @@ def test_noise_is_found_under_motion(sigma: float) -> None:
 @pytest.mark.parametrize("sigma", [0.5, 1.0, 2.0])
 def test_noise_is_found_through_quantisation(sigma: float) -> None:
     signal = np.round(step_response(4000) + np.random.default_rng(4).normal(scale=sigma, size=4000))
-    assert estimate_noise(signal) == pytest.approx(np.hypot(sigma, 1.0 / np.sqrt(12.0)), rel=0.25)
+    assert estimate_noise(signal) == pytest.approx(np.hypot(sigma, 1.0 / np.sqrt(12.0)), rel=0.05)
+
+
+def at_rest(count: int) -> np.ndarray:
+    """Six rests, at other places between two levels each."""
+    return np.repeat([0.0, 0.13, 3.3, 0.5, 2.71, 1.9], count // 6 + 1)[:count]
+
+
+@pytest.mark.parametrize("sigma", [0.3, 0.8, 3.0])
+@pytest.mark.parametrize("shape", [step_response, at_rest])
+def test_noise_of_a_sensor_in_levels_is_right_to_a_few_per_cent(
+    sigma: float, shape: Callable[[int], np.ndarray]
+) -> None:
+    """Truth is the error of the rounded readings themselves; a median of their differences is off by a third."""
+    ratios = []
+    for seed in range(8):
+        clean = shape(800)
+        readings = np.round(clean + np.random.default_rng(seed).normal(scale=sigma, size=clean.size))
+        ratios.append(estimate_noise(readings) / np.sqrt(np.mean((readings - clean) ** 2)))
+    assert np.mean(ratios) == pytest.approx(1.0, abs=0.04)
+    assert np.max(np.abs(np.asarray(ratios) - 1.0)) < 0.12
+
+
+def test_without_levels_the_noise_is_that_of_the_median_of_differences() -> None:
+    signal = step_response(4000) + np.random.default_rng(3).normal(scale=0.1, size=4000)
+    medians = [1.4826 * np.median(np.abs(np.diff(signal, n=n))) / np.sqrt(v) for n, v in ((2, 6.0), (3, 20.0))]
+    assert estimate_noise(signal) == min(medians)
+    # Levels that are fine beside the noise change nothing either.
+    fine = np.round(signal[:400] / 0.005) * 0.005
+    assert estimate_noise(fine) == pytest.approx(
+        min(1.4826 * np.median(np.abs(np.diff(fine, n=n))) / np.sqrt(v) for n, v in ((2, 6.0), (3, 20.0))), rel=1e-12
+    )
 
 
 def test_rounding_is_the_least_noise() -> None:
