@@ -175,10 +175,13 @@ def ended_sentence(end: FitEnd) -> str:
         Status.NOTHING_FREE: "no parameter is free",
         Status.EXCEEDED: "other fits were far better after as many steps",
     }[end.status]
-    return (
-        f"The fit stopped after {end.steps} steps: {reason}. {end.same_cost} of the {end.fits} fits run until their end "
-        f"found the same least cost{'' if end.same_cost == end.fits else ', the others a higher one'}."
+    compared = (
+        "It is the only fit that was run until its end."
+        if end.fits == 1
+        else f"{end.same_cost} of the {end.fits} fits run until their end found the same least cost"
+        f"{'' if end.same_cost == end.fits else ', the others a higher one'}."
     )
+    return f"The fit stopped after {end.steps} steps: {reason}. {compared}"
 
 
 def _times(result: Identified) -> str:

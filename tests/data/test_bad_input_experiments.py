@@ -307,6 +307,16 @@ def test_an_effect_that_the_load_cannot_show_is_a_warning(tmp_path: Path) -> Non
     assert not _warned(experiment, "effects.only names 'latent_heat'")
 
 
+def test_an_effect_that_is_kept_out_and_could_not_be_shown_anyway_is_warned_of(tmp_path: Path) -> None:
+    excluded = '[effects]\nexclude = ["nonlinear_spring", "latent_heat"]\n[sampling]'
+    experiment = bench(tmp_path, ("[sampling]", excluded))
+    assert _warned(
+        experiment,
+        "effects.exclude names 'nonlinear_spring', which changes nothing of this load and drive; it would not be tried anyway",
+    )
+    assert not _warned(experiment, "effects.exclude names 'latent_heat'")
+
+
 def _with_line(path: Path, number: int, text: str) -> None:
     lines = path.read_text().splitlines()
     lines[number - 1] = text

@@ -9,10 +9,12 @@ from typing import Any
 import pytest
 
 from smajax.attribution.findings import CoefficientFinding, Findings
+from smajax.fit.identify_result import FitEnd
+from smajax.fit.levenberg_marquardt import Status
 from smajax.model.effects.library import LIBRARY
 from smajax.report.effect_words import meaning, sign_sentences
 from smajax.report.html import findings_to_html
-from smajax.report.identify_words import of_effects
+from smajax.report.identify_words import ended_sentence, of_effects
 from smajax.report.narrative import narrate
 from tests.helpers.made_findings import made_effect, made_findings
 
@@ -60,3 +62,10 @@ def test_a_negative_delay_is_said_to_be_a_clock_s() -> None:
     other: Any = SimpleNamespace(name="convection_coefficient", value=90.0, standard_error=1.0)
     (said,) = of_effects([estimate, other])
     assert said.startswith(early)
+
+
+def test_the_end_of_a_single_fit_is_compared_with_no_other() -> None:
+    end = FitEnd(Status.CONVERGED, 12, 100, 1e-8, fits=1, same_cost=1)
+    assert ended_sentence(end).endswith("It is the only fit that was run until its end.")
+    both = ended_sentence(dataclasses.replace(end, fits=3, same_cost=2))
+    assert both.endswith("2 of the 3 fits run until their end found the same least cost, the others a higher one.")

@@ -53,8 +53,17 @@ def _check_groups(path: Path, file: ExperimentFile, declared: Mapping[str, str],
 
 
 def useless(file: ExperimentFile, model: ModelDescription) -> list[str]:
-    """Effects that are asked for and that this model cannot show."""
-    none = [name for name in file.effects.only or [] if model.effects is not None and name not in model.effects]
-    return [
-        f"effects.only names {name!r}, which changes nothing of this load and drive; it is not tried" for name in none
+    """Effects that are asked for, or kept out, and that this model cannot show."""
+    if model.effects is None:
+        return []
+    none = "which changes nothing of this load and drive"
+    asked = [
+        f"effects.only names {name!r}, {none}; it is not tried"
+        for name in file.effects.only or []
+        if name not in model.effects
+    ]
+    return asked + [
+        f"effects.exclude names {name!r}, {none}; it would not be tried anyway"
+        for name in file.effects.exclude
+        if name not in model.effects
     ]
