@@ -68,9 +68,7 @@ def estimate_noise(signal: Array, quantum: float | None = None) -> float:
         )
     floor = (detect_quantum(signal) if quantum is None else quantum) / np.sqrt(12.0)
     differences = [(np.diff(signal, n=order), variance) for order, variance in DIFFERENCE_VARIANCE.items()]
-    sigma = min(
-        MAD_TO_SIGMA * float(np.median(np.abs(one))) / np.sqrt(variance) for one, variance in differences
-    )
+    sigma = min(MAD_TO_SIGMA * float(np.median(np.abs(one))) / np.sqrt(variance) for one, variance in differences)
     increment = detect_quantum(signal)
     if increment > LEVELS_SHOW * sigma:
         sigma = min(_winsorised_sigma(one, increment) / np.sqrt(variance) for one, variance in differences)
