@@ -10,6 +10,7 @@ from typing import Any
 from markupsafe import Markup
 
 from smajax.attribution.findings import Findings, ParameterFinding, Role, coverage, moving_coverage, pooled_rmse
+from smajax.attribution.verdict import unknowns_at_bounds
 from smajax.core.display_units import chance, correlation, digits, display, label, p_value, with_error
 from smajax.core.names_of_runs import is_of_run, of_run, parameter_of
 from smajax.core.wording import and_listed, per_cent, verdict_text
@@ -198,7 +199,7 @@ def _figures(findings: Findings, output: Callable[[float | None], Shown]) -> lis
     figures.append(
         {
             "caption": "verdict",
-            "text": verdict_text(findings.verdict, findings.coefficients_at_bounds),
+            "text": verdict_text(findings.verdict, findings.coefficients_at_bounds, unknowns_at_bounds(findings)),
             "kind": "verdict",
         }
     )

@@ -24,6 +24,7 @@ from smajax.attribution.findings import (
     other_outputs,
 )
 from smajax.attribution.run_finding import BesideModels
+from smajax.attribution.verdict import unknowns_at_bounds
 from smajax.report.identifiability_words import remark_text
 from smajax.report.narrative import Narrative, narrate
 from smajax.report.narrative.rounds import chosen_text
@@ -186,12 +187,14 @@ def findings_to_json(findings: Findings, narrative: Narrative | None = None) -> 
     """The record without its time series, ready for `json.dumps(..., allow_nan=False)`."""
     words = narrative or narrate(findings)
     at_bounds = [one.name for one in findings.coefficients_at_bounds]
+    unknowns = [one.name for one in unknowns_at_bounds(findings)]
     record = {
         "experiment": findings.experiment,
         "title": findings.title,
         "source": findings.source,
         "verdict": findings.verdict,
         **({"coefficients_at_bounds": at_bounds} if at_bounds else {}),
+        **({"unknowns_at_bounds": unknowns} if unknowns else {}),
         "remaining": findings.remaining,
         "effects_excluded": findings.effects_excluded,
         "summary": words.summary,

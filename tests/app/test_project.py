@@ -228,10 +228,13 @@ def test_logs_of_another_folder_join_the_experiment(folder: Path, client: TestCl
     assert state(folder).examined.errors == {}
 
 
-def test_a_result_that_ends_at_a_bound_is_not_green(folder: Path, client: TestClient) -> None:
+@pytest.mark.parametrize(
+    ("key", "name"), [("coefficients_at_bounds", "wrong_load.share"), ("unknowns_at_bounds", "austenite_start")]
+)
+def test_a_result_that_ends_at_a_bound_is_not_green(folder: Path, client: TestClient, key: str, name: str) -> None:
     (folder / "report").mkdir()
     (folder / "report" / "report.html").write_text("", encoding="utf-8")
-    record = {"verdict": "explained", "coefficients_at_bounds": ["wrong_load.share"], "runs": []}
+    record = {"verdict": "explained", key: [name], "runs": []}
     (folder / "report" / "report.json").write_text(json.dumps(record), encoding="utf-8")
     page = client.get("/result").text
     assert "Verdict: explained, at a bound" in page

@@ -331,3 +331,23 @@ def test_effects_that_the_file_keeps_from_being_candidates_are_counted() -> None
     (said,) = [one for one in narrate(findings).summary if "were not tried" in one]
     assert said.startswith(f"{len(findings.effects)} effects of the library were candidates; 48 more")
     assert not any("were not tried" in one for one in narrate(made_findings()).summary)
+    (said,) = [one for one in narrate(dataclasses.replace(findings, effects_excluded=1)).summary if "not tried" in one]
+    assert (
+        "1 more that this model can show was not tried, because [effects] of the experiment file leaves it out" in said
+    )
+
+
+def test_a_noise_that_nobody_declared_is_not_said_to_be_declared() -> None:
+    findings = made_findings()
+    for ratio, said in ((1.4, "What is left is white but 1.4 times the"), (0.7, "What is left is 0.70 times the")):
+        residual = dataclasses.replace(findings.residual_after, ratio=ratio)
+        own = dataclasses.replace(findings, residual_after=residual)
+        (estimated,) = [one for one in narrate(own).summary if one.startswith(said)]
+        (given,) = [
+            one
+            for one in narrate(dataclasses.replace(own, noise_how="given as 0.02 mm")).summary
+            if one.startswith(said)
+        ]
+        assert "declare" not in estimated.lower()
+        assert f"{said} estimated noise" in estimated
+        assert f"{said} declared noise" in given

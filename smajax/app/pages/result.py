@@ -37,7 +37,7 @@ def _runs(record: Mapping[str, Any]) -> list[dict[str, str]]:
 def shown(project: Project, result: Result) -> dict[str, Any]:
     """What the page says of one result folder."""
     record = project.record_of(result)
-    at_bounds = record.get("coefficients_at_bounds") or []
+    at_bounds = [*(record.get("coefficients_at_bounds") or []), *(record.get("unknowns_at_bounds") or [])]
     return {
         "result": result,
         "title": record.get("title", ""),

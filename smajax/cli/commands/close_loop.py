@@ -80,9 +80,11 @@ def _rounds_shown(out: Path) -> int:
 
 
 def print_findings(findings: Findings, page: Path) -> None:
+    from smajax.attribution.verdict import unknowns_at_bounds
     from smajax.report.narrative import narrate
 
-    _print_answer(findings.title, findings.verdict, findings.coefficients_at_bounds, narrate(findings).summary, page)
+    at_bounds = (*findings.coefficients_at_bounds, *unknowns_at_bounds(findings))
+    _print_answer(findings.title, findings.verdict, at_bounds, narrate(findings).summary, page)
 
 
 def _print_answer(title: str, verdict: str, at_bounds: Sized, summary: Sequence[str], page: Path) -> None:
@@ -114,7 +116,7 @@ def _within(seconds: float, out: Path, json_out: bool) -> None:
     if json_out:
         typer.echo(json.dumps(known))
     else:
-        at_bounds = known.get("coefficients_at_bounds", [])
+        at_bounds = [*known.get("coefficients_at_bounds", []), *known.get("unknowns_at_bounds", [])]
         _print_answer(known["title"], known["verdict"], at_bounds, known["summary"], out / "report.html")
     typer.echo(f"The time was over before: {known['remaining'] or 'the controllers were tuned'}; {resumes}.", err=True)
     raise typer.Exit(UNMET)

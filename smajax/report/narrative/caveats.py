@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -11,13 +11,13 @@ from smajax.attribution.findings import (
     Findings,
     ParameterFinding,
     RunFinding,
-    Verdict,
     other_outputs,
     pooled_rmse,
     pooled_rmse_of,
 )
 from smajax.attribution.paired_errors import Comparison, runs_compared
 from smajax.attribution.record_error import OutlierRun
+from smajax.attribution.verdict import NOTHING_MORE, unknowns_at_bounds
 from smajax.core.display_units import digits, label
 from smajax.core.wording import and_listed
 from smajax.model.effects.library import LIBRARY
@@ -28,7 +28,6 @@ NAMED_SIZES = 4  # in a sentence
 UNLIKE = 2.0  # by which the noises that outputs leave differ and are more than noise
 NORMAL_95 = 1.96
 EVEN = 0.5  # of a probability: as likely as not
-NOTHING_MORE = (Verdict.ADEQUATE, Verdict.EXPLAINED)
 
 
 def of_an_outlier(findings: Findings) -> list[str]:
@@ -58,7 +57,7 @@ def of_the_noise(findings: Findings) -> Iterator[str]:
     after, config = findings.residual_after, findings.config
     if findings.verdict not in NOTHING_MORE and not after.white and after.ratio < config.noise_may_be_wrong:
         yield (
-            f"What is left is no more than {after.ratio:.2f} times the noise: noise that is larger than declared, or autocorrelated, looks the "
+            f"What is left is no more than {after.ratio:.2f} times the noise: noise that is larger than {_declared(findings)}, or autocorrelated, looks the "
             "same. Look at a stretch of the log in which nothing moves before you look for physics."
         )
     if after.filter_coefficient > 0.0 and not after.white and after.ratio > config.wrong_noise:
@@ -119,6 +118,22 @@ def of_coefficients_at_bounds(findings: Findings) -> Iterator[str]:
         yield f"Mind: {and_listed(ends)}: {why} too narrow."
 
 
+def of_unknowns_at_bounds(findings: Findings) -> Iterator[str]:
+    """That a model which leaves noise is not to be trusted all the same: an unknown of the experiment ends at a bound."""
+    yield from _truth_beyond(unknowns_at_bounds(findings))
+
+
+def _truth_beyond(parameters: Sequence[ParameterFinding]) -> Iterator[str]:
+    """What it means that parameters of the base model end at a bound; nothing of none."""
+    if not parameters:
+        return
+    its = "its bounds" if len(parameters) == 1 else "their bounds"
+    yield (
+        f"Mind: {and_listed([_ends(one) for one in parameters])}. The truth may lie beyond, and what was fitted beside it makes up for that: widen "
+        f"{its} in the experiment file where physics allows it, or look at what is taken as known."
+    )
+
+
 def zero_so_far(findings: Findings) -> list[EffectFinding]:
     """Of an unfinished search: effects of its likeliest model that the numbers known by then do not tell from none.
 
@@ -164,14 +179,8 @@ def of_bounds(findings: Findings) -> Iterator[str]:
         yield f"Mind: {and_listed(ends)}: the runs do not determine {them}, or ask for more than the effect allows."
     # A value of a preset has no bounds in the file (`of_priors_left`).
     own = [one for one in findings.after if one.limited and not one.name.startswith(added)]
-    own = [one for one in own if not far_text(findings, one)]
-    if own:
-        ends = [_ends(one) for one in own]
-        its = "its bounds" if len(own) == 1 else "their bounds"
-        yield (
-            f"Mind: {and_listed(ends)}. The truth may lie beyond, and what was fitted beside it makes up for that: widen "
-            f"{its} in the experiment file where physics allows it, or look at what is taken as known."
-        )
+    said = unknowns_at_bounds(findings)
+    yield from _truth_beyond([one for one in own if one not in said and not far_text(findings, one)])
 
 
 def of_priors_left(findings: Findings) -> Iterator[str]:
@@ -299,16 +308,29 @@ def of_the_test(findings: Findings) -> Iterator[str]:
         yield f"Mind: on {', '.join(worse)}, which the fit never saw, the extended model does worse than the base model."
     if not any(run.role == "held-out" for run in findings.runs):
         yield "No run was held out, so nothing here was tested on data that the fit never saw."
+    yield from _of_the_ratio(findings)
+
+
+def _declared(findings: Findings) -> str:
+    """How the noise is known: `declared` by the experiment file, or `estimated`."""
+    every = [findings.noise_how, *(one.noise_how for one in other_outputs(findings))]
+    return "declared" if all(how.startswith("given") for how in every) else "estimated"
+
+
+def _of_the_ratio(findings: Findings) -> Iterator[str]:
+    """That a residual without memory is larger or smaller than the noise."""
     after, wrong = findings.residual_after, findings.config.wrong_noise
+    how = _declared(findings)
     if after.white and after.ratio > wrong:
         yield (
-            f"What is left is white but {after.ratio:.1f} times the declared noise: either the noise was declared too small or "
+            f"What is left is white but {after.ratio:.1f} times the {how} noise: either the noise was {how} too small or "
             "something fast is missing, or the samples are not those of these inputs."
         )
     if after.ratio < 1.0 / wrong:
+        remedy = "Declare it smaller, or as 'estimate'," if how == "declared" else "Give it as a number"
         yield (
-            f"What is left is {after.ratio:.2f} times the declared noise: the noise was declared too large, and an effect "
-            "smaller than it may hide. Declare it smaller, or as 'estimate', and run again."
+            f"What is left is {after.ratio:.2f} times the {how} noise: the noise was {how} too large, and an effect "
+            f"smaller than it may hide. {remedy} and run again."
         )
 
 
@@ -316,8 +338,8 @@ def of_effects_excluded(findings: Findings) -> list[str]:
     """That the experiment file keeps effects from being candidates: none of these can be named."""
     if not findings.effects_excluded:
         return []
-    tried = len(findings.effects)
+    tried, one = len(findings.effects), findings.effects_excluded == 1
     return [
         f"{tried} effect{'s' if tried != 1 else ''} of the library {'were candidates' if tried != 1 else 'was a candidate'}; {findings.effects_excluded} more "
-        "that this model can show were not tried, because [effects] of the experiment file leaves them out."
+        f"that this model can show {'was' if one else 'were'} not tried, because [effects] of the experiment file leaves {'it' if one else 'them'} out."
     ]

@@ -18,6 +18,7 @@ from smajax.attribution.findings import (
     pooled_rmse_of,
 )
 from smajax.attribution.record_error import OutlierRun
+from smajax.attribution.verdict import unknowns_at_bounds
 from smajax.core.display_units import label
 from smajax.core.wording import and_listed, of_those_moving, per_cent
 from smajax.report.effect_words import meaning, sign_sentences
@@ -40,12 +41,18 @@ VERDICTS = {
 
 
 AT_A_BOUND = ("Explained, but by what ends at a bound", "fair")
+UNKNOWN_AT_A_BOUND = {
+    Verdict.ADEQUATE: ("Adequate, but an unknown ends at a bound", "fair"),
+    Verdict.EXPLAINED: ("Explained, but an unknown ends at a bound. Added", "fair"),
+}
 
 
 def headline(findings: Findings) -> tuple[str, str]:
-    """(headline of the page, its tone): an effect with a coefficient at a bound is not what a reader may trust."""
+    """(headline of the page, its tone): what ends at a bound, a coefficient of an effect or an unknown, is not what a reader may trust."""
     if findings.verdict is Verdict.EXPLAINED and findings.coefficients_at_bounds:
         return AT_A_BOUND
+    if unknowns_at_bounds(findings):
+        return UNKNOWN_AT_A_BOUND[findings.verdict]
     return VERDICTS[findings.verdict]
 
 
@@ -53,7 +60,13 @@ def summary(findings: Findings) -> tuple[str, ...]:
     """The answer first, then what makes it doubtful, the errors, what each effect means, and what was not found."""
     outliers = [] if _in_one_run(findings) else caveats.of_an_outlier(findings)
     sentences = [
-        " ".join([_opening(findings), *caveats.of_coefficients_at_bounds(findings)]),
+        " ".join(
+            [
+                _opening(findings),
+                *caveats.of_coefficients_at_bounds(findings),
+                *caveats.of_unknowns_at_bounds(findings),
+            ]
+        ),
         *of_wrong_records(findings),
         *outliers,
         *caveats.of_the_noise(findings),
@@ -175,7 +188,8 @@ def _explained(findings: Findings) -> str:
     if findings.fit_runs > 1 or any(run.role == "held-out" for run in findings.runs):
         off = caveats.held_out_off(findings)
         but = f", but not on {and_listed([run.name for run in off])}, held out: more may be missing" if off else ""
-        lacks = "may lack" if findings.coefficients_at_bounds else "lacks"
+        doubtful = findings.coefficients_at_bounds or unknowns_at_bounds(findings)
+        lacks = "may lack" if doubtful else "lacks"
         return f"The base model {lacks}: {listed}. With it, what is left on the fit runs is measurement noise{but}."
     return (
         f"The base model may lack: {listed}. With it, what is left on the one fit run is measurement noise. No run was "
