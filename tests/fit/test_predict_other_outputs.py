@@ -102,3 +102,19 @@ def test_of_logs_with_other_sensors_each_is_compared_on_its_own(model: ActuatorM
 def test_a_log_with_none_of_the_models_sensors_is_refused(model: ActuatorModel, tmp_path: Path) -> None:
     with pytest.raises(ExperimentError, match="no column 'x'"):
         sma.predict(model, written(tmp_path / "inputs.csv", model, "t", "U"))
+
+
+def test_the_error_of_a_log_names_that_log_also_where_logs_lie_in_other_folders(
+    model: ActuatorModel, tmp_path: Path
+) -> None:
+    (tmp_path / "a").mkdir()
+    (tmp_path / "b").mkdir()
+    good = written(tmp_path / "a" / "good.csv", model, "t", "U", "x", "R")
+    bad = written(tmp_path / "b" / "bad.csv", model, "t", "U")
+    with pytest.raises(ExperimentError) as raised:
+        sma.predict(model, [good, bad])
+    assert str(raised.value).startswith(f"{bad}: no column 'x'")
+    assert "runs." not in str(raised.value)
+    with pytest.raises(ExperimentError) as raised:
+        sma.predict(model, [good], inputs={"mass": "75 m"})
+    assert str(raised.value).startswith(f"{good}: runs.good.inputs.mass: ")

@@ -205,7 +205,7 @@ def _read_signals(reading: Reading, run: RunSection) -> tuple[dict[str, Signal],
                 )
             except NoColumnError as error:
                 own = TIME if reading.time is not None and error.key == reading.time.column else name
-                hint = f"; where this log alone has another one, write columns = {{ {own} = '...' }} under its [[runs]]"
+                hint = f"; where this log alone has another one, write columns = {{ {own} = '...' }} under its [[runs]] in the experiment file"
                 raise MeasuredDataError(f"{error}{hint if reading.others else ''}") from None
             if table.clock(key) is None and reading.time is not None and reading.time.column is not None:
                 moment = table.moments.get(table.name_of(reading.time.column))

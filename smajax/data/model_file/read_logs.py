@@ -130,5 +130,20 @@ def _experiment(
         data=DataSection(folder=".", decimal=decimal or log_format.decimal),  # type: ignore[arg-type]
         runs=list(runs),
     )
-    # The folder of the logs stands for that of an experiment file, and errors name the first log.
-    return experiment_of(folder / Path(str(runs[0].file)).name, file, CATALOGUE)
+    # A name in the folder of the logs stands for that of an experiment file: there is none.
+    try:
+        return experiment_of(folder / Path(str(runs[0].file)).name, file, CATALOGUE)
+    except ExperimentError as error:
+        raise _of_its_log(error, folder, runs) from error
+
+
+def _of_its_log(error: ExperimentError, folder: Path, runs: Sequence[RunSection]) -> ExperimentError:
+    """The error with the log of the run that it is about, or the first one, in the place of an experiment file."""
+    about = [run for run in runs if f"{error.key}.".startswith(f"runs.{run.name}.")]
+    log = folder / str(max(about, key=lambda run: len(run.name), default=runs[0]).file)
+    message = str(error).removeprefix(f"{error.path}: ").removeprefix(f"{error.key}: ")
+    key = error.key
+    if message.startswith(f"{log}: "):
+        # The key is that of the file, whose name stands before it.
+        key, message = "", message.removeprefix(f"{log}: ")
+    return ExperimentError(log, key, message)
