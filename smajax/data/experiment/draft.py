@@ -28,13 +28,12 @@ from smajax.data.experiment.draft_parameters import PresetLine, kept_parameters,
 from smajax.data.experiment.first_force import first_force
 from smajax.data.experiment.grouping import RunFiles
 from smajax.data.experiment.logs import Logs, Requested, logs_of
-from smajax.data.experiment.sample_rates import rates_messages
+from smajax.data.experiment.sample_rates import UNEVEN, clock_step, rates_messages
 from smajax.data.experiment.toml_file import toml_value
 from smajax.data.model_file.read import load_model
 from smajax.data.readers.read import read_table
 from smajax.data.readers.table import MeasuredDataError, Table
 
-MOST_SAMPLES = 2000  # of the longest run on the clock
 HELD_OUT_FROM = 3  # runs from which on the last one is held out
 ROLES = '# Runs of role "fit" are fitted; those of role "held-out" are not: the error on them validates the model.'
 
@@ -54,12 +53,6 @@ class Draft:
     def in_order(self, remarks: Mapping[str, str]) -> Draft:
         """With the values that are the preset's in the order of `remarks`, by name, each with its own beside it."""
         return replace(self, text=ordered(self.text, self.presets, remarks))
-
-
-def _round(step: float) -> float:
-    """Up to 1, 2 or 5 times a power of ten."""
-    power = 10.0 ** np.floor(np.log10(step))
-    return float(next(nice * power for nice in (1.0, 2.0, 5.0, 10.0) if nice * power >= step * (1.0 - 1e-9)))
 
 
 def _clock(table: Table, columns: Sequence[Column]) -> np.ndarray | None:
@@ -262,10 +255,16 @@ def _time(inputs: _Inputs) -> _Section:
         ]
     periods = [float(np.median(np.diff(clock))) for clock in clocks]
     usual = max(periods)
-    step = _round(max(usual, max(float(np.ptp(clock)) for clock in clocks) / MOST_SAMPLES))
-    irregular = any(np.ptp(np.diff(clock)) > 0.5 * period for clock, period in zip(clocks, periods, strict=True))
-    lines += ["[sampling]  # the clock to which all signals are resampled", f'step = "{1e3 * step:g} ms"', ""]
-    message = f"sampling: every {usual:.4g} s{', irregular' if irregular else ''}; the clock of the fit: {step:g} s ({LIKELY})"
+    spread = max(
+        float(np.ptp(np.diff(clock))) / max(period, 1e-300) for clock, period in zip(clocks, periods, strict=True)
+    )
+    step, why = clock_step(usual, max(float(np.ptp(clock)) for clock in clocks), spread)
+    lines += [
+        f"[sampling]  # the clock to which all signals are resampled: {why}",
+        f'step = "{1e3 * step:.6g} ms"',
+        "",
+    ]
+    message = f"sampling: every {usual:.4g} s{', irregular' if spread > UNEVEN else ''}; the clock of the fit: {step:.4g} s, {why} ({LIKELY})"
     return _Section(lines, [message, *rates_messages([file.name for file in inputs.files], periods)])
 
 
