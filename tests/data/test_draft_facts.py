@@ -56,6 +56,36 @@ def test_known_values_are_those_of_the_base_model_and_no_longer_asked_for(tmp_pa
     assert not any("gives nothing of this bench" in one for one in experiment.warnings)
 
 
+@pytest.mark.parametrize(
+    ("diameter", "wire"),
+    [("0.2 mm", "flexinol_table_3_2"), ("325 um", "flexinol_table_3_2"), ("0.4 mm", "flexinol_ht_500um")],
+)
+def test_the_wire_of_a_draft_is_the_preset_whose_diameter_is_nearest(tmp_path: Path, diameter: str, wire: str) -> None:
+    """It was that of the load, 0.5 mm and high-temperature on every bias spring, whose bounds left the truth out."""
+    made = drafted(tmp_path, load="bias_spring", known={"wire_diameter": diameter})
+    assert tomllib.loads(made.text)["model"]["wire"] == wire
+    (said,) = [one for one in made.messages if one.startswith("wire:") and "warning" not in one]
+    assert said.startswith(f"wire: {wire}, since its diameter of ")
+    assert ("as near to the 0.325 mm given as" if "325" in diameter else "nearer to the 0.") in said
+    assert f'wire = "{wire}"  # its diameter of ' in made.text
+    assert said in made.of_bench
+
+
+def test_a_wire_that_is_named_stays_and_a_diameter_far_from_its_own_is_warned_of(tmp_path: Path) -> None:
+    facts = BenchFacts(known={"wire_diameter": "0.2 mm"})
+    for wire, far in (("flexinol_ht_500um", True), ("niti_table_3_1", False)):
+        made = draft(logs(tmp_path), tmp_path / "e.toml", choice=ModelChoice("bias_spring", wire), bench=facts)
+        assert tomllib.loads(made.text)["model"]["wire"] == wire
+        said = [one for one in made.messages if one.startswith("wire:")]
+        assert bool(said) is far
+        assert all("has a diameter of 0.5 mm and yours is 0.2 mm" in one for one in said)
+
+
+def test_a_diameter_that_is_none_is_refused_as_before(tmp_path: Path) -> None:
+    with pytest.raises(ExperimentError, match="wire_diameter"):
+        drafted(tmp_path, load="bias_spring", known={"wire_diameter": "thin"})
+
+
 def test_without_facts_a_draft_is_what_it_was(tmp_path: Path) -> None:
     assert drafted(tmp_path).text == draft(logs(tmp_path), tmp_path / "e.toml").text
 

@@ -22,8 +22,8 @@ from smajax.data.experiment.column_guess import (
     times_not_read,
 )
 from smajax.data.experiment.draft_channels import channel_lines, override_lines
-from smajax.data.experiment.draft_facts import BenchFacts, Known, facts_of
-from smajax.data.experiment.draft_model import DraftModel, ModelChoice, choose_model
+from smajax.data.experiment.draft_facts import BenchFacts, Known, diameter_of, facts_of
+from smajax.data.experiment.draft_model import DraftModel, ModelChoice, choose_model, wire_messages
 from smajax.data.experiment.draft_parameters import PresetLine, kept_parameters, ordered, preset_parameters
 from smajax.data.experiment.first_force import first_force
 from smajax.data.experiment.grouping import RunFiles
@@ -93,12 +93,14 @@ def draft(
     logs = logs_of(files, tables, columns)
     by_quantity = {one.quantity: one for one, _ in logs.columns if one.quantity}
     kind_of = {one.quantity: kind for one, kind in logs.columns if one.quantity}
-    model = choose_model(by_quantity, choice)
-    known, hint = facts_of(bench or BenchFacts(), target, model, kept, [run.name for run in logs.runs])
+    bench = bench or BenchFacts()
+    diameter = diameter_of(bench)
+    model = choose_model(by_quantity, choice, diameter)
+    known, hint = facts_of(bench, target, model, kept, [run.name for run in logs.runs])
     inputs = _Inputs(tuple(files), tuple(tables), logs, by_quantity, kind_of, model, known)
     time = _time(inputs)
     own = preset_parameters(model, known) if kept is None else kept_parameters(model, kept, known)
-    of_own = [*own.messages, *hint]
+    of_own = [*([] if kept else wire_messages(model, diameter)), *own.messages, *hint]
     sections = [
         _head(inputs, title or _title(inputs), "" if kept is None else _relative(choice, target)),
         _Section(own.lines, of_own, of_bench=of_own),
@@ -222,7 +224,7 @@ def _head(inputs: _Inputs, title: str, model_file: str = "") -> _Section:
             if model_file
             else [
                 f"[model]  # {model.why}",
-                f'wire = "{model.wire}"',
+                f'wire = "{model.wire}"' + (f"  # {model.wire_why}" if model.wire_why else ""),
                 f'load = "{model.load}"',
                 f'drive = "{model.drive}"',
                 "",

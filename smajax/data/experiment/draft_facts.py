@@ -75,6 +75,15 @@ def facts_of(
     return known, [hint] if hint else []
 
 
+def diameter_of(bench: BenchFacts) -> float | None:
+    """The wire's diameter in m where it is known; None of what is none, which `checked` refuses."""
+    try:
+        diameter = parse_quantity(bench.known["wire_diameter"], "m")
+    except (KeyError, UnitError):
+        return None
+    return diameter if diameter > 0.0 else None
+
+
 def checked(
     facts: BenchFacts, path: Path, presets: str, model: ModelDescription, own: Mapping[str, float], runs: Sequence[str]
 ) -> Known:

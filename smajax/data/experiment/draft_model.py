@@ -25,6 +25,9 @@ GUESSED: Mapping[str, tuple[str, str]] = MappingProxyType(
         "angle": ("arm", "niti_table_3_1"),
     }
 )
+# By which the diameter of a preset differs from the bench's and its bounds are another wire's: convection goes about as 1/d.
+FAR = 2.0
+ALIKE = 1e-9  # m: two distances that are the same
 OTHER_WIRE: Mapping[str, str] = MappingProxyType({"bias_spring": "flexinol_ht_500um"})  # load -> wire
 
 
@@ -46,10 +49,14 @@ class DraftModel:
     inputs: tuple[str, ...]
     output: str
     why: str
+    wire_why: str = ""  # where a diameter decided
 
 
-def choose_model(columns: Mapping[str, Column], choice: ModelChoice) -> DraftModel:
-    """The presets that the columns (by quantity) suggest; named ones replace them. Raises MeasuredDataError."""
+def choose_model(columns: Mapping[str, Column], choice: ModelChoice, diameter: float | None = None) -> DraftModel:
+    """The presets that the columns (by quantity) suggest; named ones replace them. Raises MeasuredDataError.
+
+    diameter: of the bench's wire, m, where it is known: of wires that are not named the nearest is taken.
+    """
     load, wire, drive = choice.load, choice.wire, choice.drive
     model = _with_load(columns, load)
     for kind, name, known in (("wire", wire, WIRES), ("drive", drive, DRIVE_PRESETS)):
@@ -60,12 +67,42 @@ def choose_model(columns: Mapping[str, Column], choice: ModelChoice) -> DraftMod
         needed = sorted(DRIVE_PRESETS[drive]().inputs_required)
         others = [name for name in model.inputs if name not in DRIVES]
         model = replace(model, drive=drive, inputs=(*needed, *others))
-    model = replace(model, wire=wire or model.wire, why=_certainty(model.why, choice))
+    if wire:
+        model = replace(model, wire=wire)
+    elif diameter is not None and model.drive != "none":
+        model = _nearest(model, diameter)
+    model = replace(model, why=_certainty(model.why, choice))
     try:
         check_together(build(model.wire, model.load, model.drive), model.load, model.drive)
     except ValueError as error:
         raise MeasuredDataError(str(error)) from None
     return model
+
+
+def _nearest(model: DraftModel, diameter: float) -> DraftModel:
+    """With the wire of the presets for benches whose diameter is nearest; of two the first, which is the common, low-temperature one."""
+    wires = dict.fromkeys((GUESSED[model.output][1], *OTHER_WIRE.values()))
+    own = {name: float(WIRES[name]().wire_diameter) for name in wires}
+    wire = min(own, key=lambda name: round(abs(own[name] - diameter) / ALIKE))
+    others = {name: abs(size - diameter) for name, size in own.items() if name != wire}
+    tie = min(others.values()) - abs(own[wire] - diameter) < ALIKE
+    than = and_listed([f"that of {name}, {1e3 * own[name]:g} mm" for name in others])
+    why = f"its diameter of {1e3 * own[wire]:g} mm is {'as near' if tie else 'nearer'} to the {1e3 * diameter:.4g} mm given {'as' if tie else 'than'} {than}"
+    return replace(model, wire=wire, wire_why=why)
+
+
+def wire_messages(model: DraftModel, diameter: float | None) -> list[str]:
+    """Which wire a diameter (m) decided for, and that a preset's diameter is far from it."""
+    chosen = f"wire: {model.wire}, since {model.wire_why} ({GUESS}; --wire takes another)"
+    messages = [chosen] if model.wire_why else []
+    own = float(WIRES[model.wire]().wire_diameter)
+    if diameter is None or model.drive == "none" or max(own / diameter, diameter / own) < FAR:
+        return messages
+    return [
+        *messages,
+        f"wire: warning: {model.wire} has a diameter of {1e3 * own:g} mm and yours is {1e3 * diameter:.4g} mm: the bounds under [unknown] are "
+        "around the values of another wire and may leave out yours; check them, and take the data sheet's values where you have it",
+    ]
 
 
 def _certainty(why: str, choice: ModelChoice) -> str:
