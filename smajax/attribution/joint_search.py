@@ -23,7 +23,7 @@ from smajax.attribution.exclusive_effects import in_another_way, of_groups, repl
 from smajax.attribution.fit_programs import grouped
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model, independent_error
-from smajax.attribution.program_fits import EndedFit, comparison_settings, fits_by_program
+from smajax.attribution.program_fits import MOST_WIDENED, BegunFit, comparison_settings, models_by_program
 from smajax.attribution.set_starts import at_usual_size, starts
 from smajax.attribution.subset_evidence import LinearModel, Subset, linear_model
 from smajax.attribution.traces import Traces, Variant, traces_at
@@ -116,7 +116,8 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
             search.fitted[effects] = fitted_model(search.joint, effects, starts[effects], program)
     error = min(search.error(model) for model in search.fitted.values())
     # All to their end, however far behind: the base model is what every result is held against.
-    _fit_side_by_side(search, list(starts.items()), error, "fitting what the search begins with", compared=False)
+    begun = [BegunFit(effects, values) for effects, values in starts.items()]
+    _fit_side_by_side(search, begun, error, "fitting what the search begins with", compared=False)
     present = search.best(error)
     error = search.error(present)
     checked: set[tuple[str, ...]] = set()  # models whose effects were removed and replaced one by one
@@ -303,15 +304,21 @@ def _several_at_once(
     return best if best is not None and _gain(search, present, best) > SETTLED_ODDS else None
 
 
-def fitted_alone(search: JointSearch, effects: Sequence[str], error: float) -> list[FittedModel]:
-    """The base model with one of `effects` each, of those that the runs can show; `error` of an independent sample, SI."""
-    fresh = [effect for effect in effects if effect in search.detectable and (effect,) not in search.fitted]
+def fitted_alone(
+    search: JointSearch, effects: Sequence[str], error: float, most: int | None = None
+) -> list[FittedModel]:
+    """The base model with one of `effects` each, of those that the runs can show; `error` of an independent sample, SI.
+
+    `most`: of those that were not fitted at about this error so many, the likeliest in the linear model; None: all.
+    """
+    fresh = [effect for effect in effects if effect in search.detectable and _fresh(search, (effect,), error)]
     if fresh:
         linear, traces = _linear(search, search.fitted[()], error)
         places: dict[str, Variant] = {}
-        for one in sorted(linear.places, key=lambda one: linear.log_evidence(frozenset({one}))):
-            places[one.effect] = one  # the likeliest
-        _fit(search, [frozenset({places[effect]}) for effect in fresh], linear, traces, error, len(search.rounds))
+        for one in sorted(linear.places, key=lambda one: -linear.log_evidence(frozenset({one}))):
+            places.setdefault(one.effect, one)
+        likeliest = [one for effect, one in places.items() if effect in fresh][:most]
+        _fit(search, [frozenset({one}) for one in likeliest], linear, traces, error, len(search.rounds))
     return [search.fitted[effect,] for effect in effects if (effect,) in search.fitted]
 
 
@@ -319,8 +326,8 @@ def _fit(
     search: JointSearch, sets: Sequence[Subset], linear: LinearModel, traces: Traces, error: float, number: int
 ) -> None:
     """Fit the sets, all side by side, from the present values and from where the linear model points to."""
-    joint = search.joint
-    begun: list[tuple[tuple[str, ...], np.ndarray]] = []
+    joint = dataclasses.replace(search.joint, width_factors={**linear.width_factors, **search.joint.width_factors})
+    begun: list[BegunFit] = []
     groups = _grouped(search, [_effects(search, subset) for subset in sets])
     restricted = [joint.restricted(program) for program, _ in groups]
     made_ready([problem for problem, _ in restricted])
@@ -329,23 +336,23 @@ def _fit(
         points = [starts(joint, subset, linear, traces) for subset in here]
         for subset, start in zip(here, nearest(problem.with_noise(error), points, index), strict=True):
             effects = _effects(search, subset)
-            begun.append((effects, start))
+            begun.append(BegunFit(effects, start, linear.width_factors))
             if set(effects) - set(traces.present):
                 # And, where an effect is new, from its usual size: near zero the misfit may have a minimum of its own.
-                begun.append((effects, at_usual_size(joint, subset, traces, start)))
-    _fit_side_by_side(
-        search, begun, error, f"round {search.rounds_before + number + 1}: fitting the likeliest sets of effects"
-    )
+                usual = at_usual_size(joint, subset, traces, start)
+                begun.append(BegunFit(effects, usual, linear.width_factors))
+    stage = f"round {search.rounds_before + number + 1}: fitting the likeliest sets of effects"
+    _fit_side_by_side(search, begun, error, stage)
 
 
 def _fit_side_by_side(
     search: JointSearch,
-    begun: Sequence[tuple[tuple[str, ...], np.ndarray]],
+    begun: Sequence[BegunFit],
     error: float,
     stage: str,
     compared: bool = True,
 ) -> None:
-    """Fit sets of effects from values (P,), those of one program side by side; the better of two fits of one set counts.
+    """Fit sets of effects, those of one program side by side; the better of two fits of one set counts.
 
     `compared`: those that fall far behind end early.
     """
@@ -355,20 +362,14 @@ def _fit_side_by_side(
     if not compared:
         settings = dataclasses.replace(settings, allowed_excess=(), promised_excess=None)
     groups = [
-        (program, [one for one in begun if one[0] in its_sets])
-        for program, its_sets in _grouped(search, [effects for effects, _ in begun])
+        (program, [one for one in begun if one.effects in its_sets])
+        for program, its_sets in _grouped(search, [one.effects for one in begun])
     ]
-    least: dict[tuple[str, ...], EndedFit] = {}
-    for fit in fits_by_program(joint, groups, error, settings):
-        search.trials[fit.effects] = error
-        if np.isfinite(fit.cost) and (fit.effects not in least or fit.cost < least[fit.effects].cost):
-            least[fit.effects] = fit
-    for effects, fit in least.items():
-        # Coefficients of other effects count for nothing in this model.
-        model = fitted_model(joint, effects, joint.without(fit.values, effects), fit.program)
-        old = search.fitted.get(effects)
+    search.trials |= {one.effects: error for one in begun}
+    for model in models_by_program(joint, groups, error, settings, MOST_WIDENED if compared else 0):
+        old = search.fitted.get(model.effects)
         if old is None or model.log_evidence(error**2) > old.log_evidence(error**2):
-            search.fitted[effects] = model
+            search.fitted[model.effects] = model
 
 
 def _grouped(
@@ -387,5 +388,5 @@ def fitted_from(search: JointSearch, model: FittedModel) -> FittedModel:
     """The effects of `model`, fitted with every free parameter of `search` from its values; `model` where that fit has no number."""
     error = search.error(model)
     stage = "fitting the base model with the values of presets free"
-    _fit_side_by_side(search, [(model.effects, model.values)], error, stage, compared=False)
+    _fit_side_by_side(search, [BegunFit(model.effects, model.values)], error, stage, compared=False)
     return search.fitted.get(model.effects, model)

@@ -15,6 +15,7 @@ import numpy as np
 from smajax.attribution.findings import LikelierModel, NoLikelierModel, Reason, Round, StepDependent
 from smajax.attribution.joint_search import (
     MANY,
+    NEIGHBOURS,
     JointRound,
     JointSearch,
     fitted_alone,
@@ -126,7 +127,14 @@ class _Stage:
             return None
         fits = self._asked(search).fits
         functions = self._likelier(search, found, () if fits is None else fits.fitted)
-        return self._one_effect(search, found, functions) if functions else None
+        other = self._one_effect(search, found, functions) if functions else None
+        return other or (self._one_of_all(search, found) if len(found.effects) >= MANY else None)
+
+    def _one_of_all(self, search: JointSearch, found: FittedModel) -> FittedModel | None:
+        """The base model with one effect that is likelier than the many of `found`, of those that the linear model about the base model finds likeliest."""
+        every = [name for name in search.joint.coefficients if name not in search.excluded]
+        likelier = self._likelier(search, found, fitted_alone(search, every, search.error(found), NEIGHBOURS))
+        return likelier[0] if likelier else None
 
     def _asked(self, search: JointSearch) -> AskedFor:
         """Unknown functions beside the base model, whose values of presets are free in them as well."""

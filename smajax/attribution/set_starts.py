@@ -65,7 +65,8 @@ def _begin(
         prior, bounds = joint.priors[name], joint.bounds[name]
         value = traces.places.get(variant, {}).get(name, guesses.get(name.split(".", 1)[1], prior.base))
         if name in switches:
-            size = float(np.clip(estimated[name] / prior.sigma, -MOST_START, MOST_START))
+            most = MOST_START * joint.width_factors.get(variant.effect, 1.0)
+            size = float(np.clip(estimated[name] / prior.sigma, -most, most))
             if abs(size) < LEAST_START:
                 size = float(np.copysign(LEAST_START, size)) if bounds[0] < prior.base else LEAST_START
             value = prior.base + size * prior.sigma

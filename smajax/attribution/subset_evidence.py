@@ -8,6 +8,10 @@ $$\ln p(y|S) = \tfrac12 b^T M^{-1} b - \tfrac12 \ln\det M + \tfrac12 \ln\det\Lam
 M = J_S^T J_S/s^2 + \Lambda_S,\ b = J_S^T y/s^2$$
 
 (MacKay 1992; George & McCulloch 1993 for the search over sets). $s^2$ is the variance of an independent sample.
+
+The widths of an effect that is off are those of its file times the factor $\tau \geq 1$ that is likeliest where the effect is added alone, with its
+prior of $\tau^{-2}$, as those of a fitted effect are (`laplace_evidence`). Else the prior would hold an effect that is far larger than usual next to zero,
+in this model and in the fit that begins from it, and others would take its place.
 """
 
 from __future__ import annotations
@@ -24,6 +28,7 @@ from smajax.attribution.traces import Traces, Variant
 from smajax.fit.uncertainty import at_bound
 
 Subset = frozenset[Variant]
+WIDTHS = tuple(2.0**power for power in range(7))  # factors of an effect's widths that are compared
 IMPOSSIBLE = 6.0  # standard errors on the wrong side of zero
 FREE_OF_BOUNDS = 1e-6  # of the range: nearer to a bound an unknown is held
 
@@ -53,6 +58,7 @@ class LinearModel:
     log_odds: dict[Variant, float]
     squares: float  # of the outputs where all coefficients are at their base, SI squared
     variance: float  # of an independent sample, SI squared
+    width_factors: dict[str, float] = field(default_factory=dict)  # of the priors of effects that are off
     cached: dict[Subset, float] = field(default_factory=dict)
 
     def log_evidence(self, subset: Subset) -> float:
@@ -165,7 +171,7 @@ def linear_model(joint: JointParameters, traces: Traces, variance: float, candid
             if variant.effect in traces.present:
                 target += columns[-1] * joint.deviation(name, value)
     matrix = np.stack(columns, axis=1) if columns else np.zeros((len(target), 0))
-    return LinearModel(
+    linear = LinearModel(
         traces=traces,
         joint=joint,
         unknowns=unknowns,
@@ -180,6 +186,45 @@ def linear_model(joint: JointParameters, traces: Traces, variance: float, candid
         squares=float(target @ target),
         variance=variance,
     )
+    _widen(linear)
+    return linear
+
+
+def _widen(linear: LinearModel) -> None:
+    """Widen the priors of every effect that is off, beside those that are present, by its likeliest factor."""
+    present = [one for one in linear.places if one.effect in linear.traces.present]
+    shared = linear._columns(frozenset(present))
+    matrix = linear.gram[np.ix_(shared, shared)] + np.diag(linear.precision[shared])
+    factor = scipy.linalg.cho_factor(matrix)
+    explained = scipy.linalg.cho_solve(factor, linear.right[shared])
+    best: dict[str, float] = {}
+    for variant, own in linear.places.items():
+        if variant in present:
+            continue
+        across = linear.gram[np.ix_(own, shared)]
+        left = linear.gram[np.ix_(own, own)] - across @ scipy.linalg.cho_solve(factor, across.T)
+        width, value = likeliest_width(left, linear.right[own] - across @ explained, linear.one_sided[own])
+        linear.precision[own] = width**-2
+        linear.log_odds[variant] -= 2.0 * float(np.log(width))
+        value += linear.log_odds[variant]
+        if value > best.get(variant.effect, -np.inf):
+            best[variant.effect], linear.width_factors[variant.effect] = value, width
+
+
+def likeliest_width(gram: np.ndarray, right: np.ndarray, one_sided: np.ndarray) -> tuple[float, float]:
+    """(likeliest factor of the prior widths of coefficients, its log evidence without the prior of the factor), from their normal equations alone."""
+    values, vectors = np.linalg.eigh(gram)
+    values, turned = np.maximum(values, 0.0), vectors.T @ right
+    found = 1.0, -np.inf
+    for width in WIDTHS:
+        inverse = 1.0 / (values + width**-2)
+        evidence = 0.5 * float(turned**2 @ inverse) - 0.5 * float(np.log1p(width**2 * values).sum())
+        if one_sided.any():
+            ratio = (vectors @ (inverse * turned) / np.sqrt(vectors**2 @ inverse))[one_sided]
+            evidence += float(np.sum(np.log(2.0) + scipy.stats.norm.logcdf(ratio)))
+        if evidence - 2.0 * np.log(width) > found[1] - 2.0 * np.log(found[0]):
+            found = width, evidence
+    return found
 
 
 def _odds(joint: JointParameters, places: Mapping[Variant, object]) -> dict[Variant, float]:

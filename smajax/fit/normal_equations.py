@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from smajax.fit.outputs_of_runs import predicted_and_derivatives, predicted_at
+from smajax.fit.priors import Priors
 from smajax.fit.problem import FitTask, Problem
 
 NormalEquations = tuple[float, np.ndarray, np.ndarray]  # r^T r, J^T r, J^T J of one fit, by shares of its range
@@ -24,7 +25,11 @@ def _residual(
     with np.errstate(over="ignore", invalid="ignore"):  # a step to where a load jumps: it will be rejected
         misfits = _weight(problem, task) * problem.centred(measured - predicted)
     drift = task.regularisation * (y - task.initial_guess)
-    return np.concatenate([misfits.ravel(), problem.priors.rows(point), drift])
+    return np.concatenate([misfits.ravel(), _priors(problem, task).rows(point), drift])
+
+
+def _priors(problem: Problem, task: FitTask) -> Priors:
+    return problem.priors if task.priors is None else task.priors
 
 
 def _misfit_by_series(problem: Problem, task: FitTask, residual: np.ndarray) -> np.ndarray:
@@ -65,7 +70,7 @@ def normal_equations(
     for k, (task, y) in enumerate(zip(tasks, ys, strict=True)):
         value = _residual(problem, task, y, points[k], predicted[k], measured[k])
         jacobian = -_weight(problem, task) * problem.centred(derivatives[k, : len(task.slots)])
-        prior = problem.priors.slopes(points[k])[:, task.slots] * (task.high - task.low)
+        prior = _priors(problem, task).slopes(points[k])[:, task.slots] * (task.high - task.low)
         columns = jacobian.reshape(len(task.slots), -1), prior.T, np.diag(task.regularisation)
         rows = np.concatenate(columns, axis=1)
         with np.errstate(over="ignore", invalid="ignore"):

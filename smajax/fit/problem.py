@@ -35,6 +35,7 @@ class FitTask(NamedTuple):
     weights: np.ndarray  # (R,): 0 leaves a run out
     regularisation: np.ndarray  # (F,): pull back to the initial guess, in the residual's unit per range
     goal: float = math.inf  # cost that it has to promise to come to (`FitSettings`)
+    priors: Priors | None = None  # None: those of the problem
 
     @property
     def initial_guess(self) -> np.ndarray:

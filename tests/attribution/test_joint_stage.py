@@ -118,10 +118,10 @@ def _stage_and_search(
 
     monkeypatch.setattr(joint_stage, "asked_for", asked_for)
 
-    def fitted_alone(search: Any, effects: Sequence[str], error: float) -> list[Any]:
-        # Of the function's equation, without what was excluded.
-        assert list(effects) == ["sensor_drift"]
-        return list(alone)
+    def fitted_alone(search: Any, effects: Sequence[str], error: float, most: int | None = None) -> list[Any]:
+        # Of the function's equation, or the likeliest of all, without what was excluded.
+        assert list(effects) == (["sensor_drift"] if most is None else ["latent_heat", "sensor_drift"])
+        return [one for one in alone if one.effects[0] in effects]
 
     monkeypatch.setattr(joint_stage, "fitted_alone", fitted_alone)
     search = SimpleNamespace(
@@ -175,6 +175,15 @@ def test_one_effect_of_the_functions_equation_comes_before_it(monkeypatch: pytes
     assert asked(search, _model(THREE, 5.0, 30.0)) is None  # likelier than the function
     assert stage.before_the_end(search, _model(["sensor_drift"], 1.0, 10.0)) is None
     assert stage.before_the_end(search, _model((), 5.0, 0.0)) is None
+
+
+def test_one_effect_that_is_likelier_comes_in_the_place_of_many(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever unknown functions say. Two effects may be what is missing: no others are fitted alone."""
+    heat = _model(["latent_heat"], 1.0, 21.0)
+    stage, search, _ = _stage_and_search(monkeypatch, [], [heat])
+    assert stage.before_the_end(search, _model(THREE, 5.0, 10.0)) is heat
+    assert stage.before_the_end(search, _model(THREE, 5.0, 30.0)) is None
+    assert stage.before_the_end(search, _model(THREE[:2], 5.0, 10.0)) is None
 
 
 def test_with_a_finer_integration_the_search_goes_on_from_the_likeliest_models(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model, independent_error
 from smajax.attribution.model_fits import Model, Search
-from smajax.attribution.program_fits import comparison_settings, fits_by_program
+from smajax.attribution.program_fits import BegunFit, comparison_settings, fits_by_program
 from smajax.attribution.score_test import Score, ranked
 from smajax.attribution.unknown.ranges import Sought, sought
 from smajax.attribution.unknown.terms import UNKNOWN
@@ -187,7 +187,7 @@ def fitted_terms(
     for program, terms in programs_of_terms(joint, effects, list(places)):
         problem, index = joint.restricted(program)
         begun = nearest(problem.with_noise(error), [places[term] for term in terms], index)
-        groups.append((program, [((*effects, term), at) for term, at in zip(terms, begun, strict=True)]))
+        groups.append((program, [BegunFit((*effects, term), at) for term, at in zip(terms, begun, strict=True)]))
     fits = fits_by_program(joint, groups, error, settings)
     return [fitted_model(joint, own, values, program) for own, program, values, _ in fits]
 
