@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from smajax.attribution.findings import AveragedModel, AveragedRun, DroppedModel, RunFinding
-from smajax.attribution.joint_search import JointSearch
+from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.likely_models_check import checked
 from smajax.attribution.model_fits import Model, Search

@@ -26,10 +26,10 @@ from smajax.attribution.findings import (
     Remaining,
     Verdict,
 )
+from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.held_out import Compared, compare, every_run, validated
 from smajax.attribution.input_of_run import corrected, record_error
 from smajax.attribution.job import Job, effects_excluded, job_of
-from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.joint_stage import (
     base_alone,
     likeliest_so_far,

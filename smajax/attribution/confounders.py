@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from smajax.attribution.findings import Confounder
-from smajax.attribution.joint_search import JointSearch
+from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.score_test import scaled

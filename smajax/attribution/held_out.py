@@ -20,8 +20,8 @@ from smajax.attribution.findings import (
     ResidualDiagnostics,
     RunFinding,
 )
+from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.job import Job
-from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.joint_stage import final_model, without
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search

@@ -13,26 +13,22 @@ only strong effects are added; the better the model, the finer the effects that 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
 from smajax.attribution.detectable_effects import detectable
 from smajax.attribution.exclusive_effects import in_another_way, of_groups, replaceable
 from smajax.attribution.fit_programs import grouped
-from smajax.attribution.joint_parameters import JointParameters
-from smajax.attribution.laplace_evidence import FittedModel, fitted_model, independent_error
+from smajax.attribution.fitted_sets import JointRound, JointSearch
+from smajax.attribution.laplace_evidence import FittedModel, fitted_model
 from smajax.attribution.program_fits import MOST_WIDENED, BegunFit, comparison_settings, models_by_program
 from smajax.attribution.set_starts import at_usual_size, starts
 from smajax.attribution.subset_evidence import LinearModel, Subset, linear_model
 from smajax.attribution.traces import Traces, Variant, traces_at
-from smajax.attribution.unknown.search import AskedFor
 from smajax.core.progress import Stage
-from smajax.fit.levenberg_marquardt import FitSettings
 from smajax.fit.outputs_of_runs import made_ready
 from smajax.fit.starts import nearest
-from smajax.model.effects.candidate import Extent
 
 MOST_ROUNDS = 20  # the evidence rises in every one of them, so this only ends what should have ended
 FITTED = 4  # sets a round
@@ -47,63 +43,6 @@ REACHED = 12
 LEAVES_IN_LINEAR = 4.0  # noises, up to which such a set may come down to noise when it is fitted
 MANY = 3  # effects that leave much: from here on they stand in for something else, and one more changes little
 SETTLED_ODDS = 1.0  # log odds: a model that is likelier by less is as likely, and the average has both
-
-
-@dataclass
-class JointSearch:
-    """Settings of the search, and every model fitted in it."""
-
-    joint: JointParameters
-    extent: Extent
-    settings: FitSettings
-    noise: float  # of a sample, SI
-    noise_given: bool = True  # by the experiment file; else estimated from neighbouring samples
-    fitted: dict[tuple[str, ...], FittedModel] = field(default_factory=dict)
-    trials: dict[tuple[str, ...], float] = field(
-        default_factory=dict
-    )  # error of a sample at which a set was fitted last
-    rounds: list[JointRound] = field(default_factory=list)
-    excluded: frozenset[str] = frozenset()  # candidates that no set may have
-    detectable: tuple[str, ...] = ()
-    programs: tuple[tuple[str, ...], ...] = ()  # effects that each program of the fits so far carries
-    winner: tuple[str, ...] = ()  # effects of the likeliest model when the search had ended
-    rounds_before: int = 0  # of an earlier search, from whose models this one begins
-    thorough: bool = True  # ends only where no effect of the likeliest model can be removed or replaced
-    on_round: Callable[[JointRound], None] = lambda _: None
-    # What the search goes on from in the place of a model of many effects, itself where nothing is to be sought beside it; None: as it is.
-    in_place_of_many: Callable[[FittedModel], FittedModel | None] = lambda _: None
-    # What it goes on from where it would end with a model; None: it ends.
-    before_the_end: Callable[[FittedModel], FittedModel | None] = lambda _: None
-    lacking: AskedFor | None = None  # unknown terms beside the base model, where they were asked for
-
-    def error(self, model: FittedModel) -> float:
-        """`independent_error` of what `model` leaves."""
-        return independent_error(model, self.noise, self.noise_given)
-
-    def error_of(self, effects: Sequence[str]) -> float:
-        """`error` of the fitted model with these effects."""
-        return self.error(self.fitted[self.joint.ordered(effects)])
-
-    def best(self, error: float) -> FittedModel:
-        """The likeliest model."""
-        return max(self.fitted.values(), key=lambda model: model.log_evidence(error**2))
-
-    def probabilities(self, error: float) -> dict[tuple[str, ...], float]:
-        """Of every fitted set, among these."""
-        values = np.asarray([model.log_evidence(error**2) for model in self.fitted.values()])
-        weights = np.exp(values - values.max())
-        return dict(zip(self.fitted, (weights / weights.sum()).tolist(), strict=True))
-
-
-@dataclass(frozen=True)
-class JointRound:
-    """One round: what was fitted, and what is likeliest since."""
-
-    error: float  # of an independent sample, SI
-    present: tuple[str, ...]
-    gains: tuple[tuple[tuple[str, ...], float, float], ...]  # (effects, log evidence over the present model's, rms SI)
-    best: tuple[str, ...]
-    best_gain: float  # log evidence of the best over the present model's
 
 
 def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndarray]) -> FittedModel:
@@ -304,28 +243,49 @@ def _several_at_once(
     return best if best is not None and _gain(search, present, best) > SETTLED_ODDS else None
 
 
-def fitted_alone(
-    search: JointSearch, effects: Sequence[str], error: float, most: int | None = None
-) -> list[FittedModel]:
-    """The base model with one of `effects` each, of those that the runs can show; `error` of an independent sample, SI.
-
-    `most`: of those that were not fitted at about this error so many, the likeliest in the linear model; None: all.
-    """
-    fresh = [effect for effect in effects if effect in search.detectable and _fresh(search, (effect,), error)]
-    if fresh:
-        linear, traces = _linear(search, search.fitted[()], error)
-        places: dict[str, Variant] = {}
-        for one in sorted(linear.places, key=lambda one: -linear.log_evidence(frozenset({one}))):
-            places.setdefault(one.effect, one)
-        likeliest = [one for effect, one in places.items() if effect in fresh][:most]
-        _fit(search, [frozenset({one}) for one in likeliest], linear, traces, error, len(search.rounds))
+def fitted_alone(search: JointSearch, effects: Sequence[str], error: float) -> list[FittedModel]:
+    """The base model with one of `effects` each, of those that the runs can show; `error` of an independent sample, SI."""
+    fresh = [effect for effect in effects if (effect,) not in search.fitted]
+    _fit_alone(search, fresh, error)
     return [search.fitted[effect,] for effect in effects if (effect,) in search.fitted]
 
 
-def _fit(
-    search: JointSearch, sets: Sequence[Subset], linear: LinearModel, traces: Traces, error: float, number: int
+def likeliest_alone(search: JointSearch, effects: Sequence[str], found: FittedModel) -> list[FittedModel]:
+    """The base model with one of `effects` each that has come near to `found`, of the `NEIGHBOURS` that the linear model about the base model finds likeliest."""
+    error = search.error(found)
+    fresh = [effect for effect in effects if _fresh(search, (effect,), error)]
+    _fit_alone(search, fresh, error, NEIGHBOURS, found.squares / error**2)
+    return [search.fitted[effect,] for effect in effects if (effect,) in search.fitted]
+
+
+def _fit_alone(
+    search: JointSearch, effects: Sequence[str], error: float, most: int | None = None, least_cost: float = np.inf
 ) -> None:
-    """Fit the sets, all side by side, from the present values and from where the linear model points to."""
+    """Fit the base model with one of `effects` each, of those that the runs can show: the `most` likeliest in the linear model, None for all."""
+    shown = [effect for effect in effects if effect in search.detectable]
+    if not shown:
+        return
+    linear, traces = _linear(search, search.fitted[()], error)
+    places: dict[str, Variant] = {}
+    for one in sorted(linear.places, key=lambda one: -linear.log_evidence(frozenset({one}))):
+        places.setdefault(one.effect, one)
+    sets = [frozenset({one}) for effect, one in places.items() if effect in shown][:most]
+    _fit(search, sets, linear, traces, error, len(search.rounds), least_cost)
+
+
+def _fit(
+    search: JointSearch,
+    sets: Sequence[Subset],
+    linear: LinearModel,
+    traces: Traces,
+    error: float,
+    number: int,
+    least_cost: float = np.inf,
+) -> None:
+    """Fit the sets, all side by side, from the present values and from where the linear model points to.
+
+    `least_cost`: of another model at this error, which fits that fall far behind are not worth their time beside.
+    """
     joint = dataclasses.replace(search.joint, width_factors={**linear.width_factors, **search.joint.width_factors})
     begun: list[BegunFit] = []
     groups = _grouped(search, [_effects(search, subset) for subset in sets])
@@ -342,7 +302,7 @@ def _fit(
                 usual = at_usual_size(joint, subset, traces, start)
                 begun.append(BegunFit(effects, usual, linear.width_factors))
     stage = f"round {search.rounds_before + number + 1}: fitting the likeliest sets of effects"
-    _fit_side_by_side(search, begun, error, stage)
+    _fit_side_by_side(search, begun, error, stage, least_cost=least_cost)
 
 
 def _fit_side_by_side(
@@ -351,14 +311,15 @@ def _fit_side_by_side(
     error: float,
     stage: str,
     compared: bool = True,
+    least_cost: float = np.inf,
 ) -> None:
     """Fit sets of effects, those of one program side by side; the better of two fits of one set counts.
 
-    `compared`: those that fall far behind end early.
+    `compared`: those that fall far behind the others, or `least_cost`, end early.
     """
     joint = search.joint
     search.settings.progress(Stage(stage, 0.0))
-    settings = comparison_settings(search.settings, stage)
+    settings = dataclasses.replace(comparison_settings(search.settings, stage), least_cost=least_cost)
     if not compared:
         settings = dataclasses.replace(settings, allowed_excess=(), promised_excess=None)
     groups = [

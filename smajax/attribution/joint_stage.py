@@ -13,13 +13,12 @@ from functools import partial
 import numpy as np
 
 from smajax.attribution.findings import LikelierModel, NoLikelierModel, Reason, Round, StepDependent
+from smajax.attribution.fitted_sets import JointRound, JointSearch
 from smajax.attribution.joint_search import (
     MANY,
-    NEIGHBOURS,
-    JointRound,
-    JointSearch,
     fitted_alone,
     fitted_from,
+    likeliest_alone,
     search_jointly,
 )
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model
@@ -131,9 +130,9 @@ class _Stage:
         return other or (self._one_of_all(search, found) if len(found.effects) >= MANY else None)
 
     def _one_of_all(self, search: JointSearch, found: FittedModel) -> FittedModel | None:
-        """The base model with one effect that is likelier than the many of `found`, of those that the linear model about the base model finds likeliest."""
+        """The base model with one effect that is likelier than the many of `found`."""
         every = [name for name in search.joint.coefficients if name not in search.excluded]
-        likelier = self._likelier(search, found, fitted_alone(search, every, search.error(found), NEIGHBOURS))
+        likelier = self._likelier(search, found, likeliest_alone(search, every, found))
         return likelier[0] if likelier else None
 
     def _asked(self, search: JointSearch) -> AskedFor:

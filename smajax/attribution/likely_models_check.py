@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from smajax.attribution.findings import DroppedModel, HeldOutWorse, StepDependent
-from smajax.attribution.joint_search import JointSearch
+from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.paired_errors import compared, pooled_rms

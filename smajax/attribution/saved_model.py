@@ -10,8 +10,8 @@ import numpy as np
 
 from smajax.attribution.averaged_prediction import Averaged, likely_models, prediction_errors
 from smajax.attribution.final_model_findings import ParametersFound
+from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.job import Job
-from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
 from smajax.core.names_of_runs import is_of_run, parameter_of

@@ -11,7 +11,8 @@ import pytest
 from smajax.attribution import likely_models_check
 from smajax.attribution.averaged_prediction import averaged, likely_models
 from smajax.attribution.findings import HeldOutWorse, StepDependent
-from smajax.attribution.joint_search import JointSearch, search_jointly
+from smajax.attribution.fitted_sets import JointSearch
+from smajax.attribution.joint_search import search_jointly
 from smajax.attribution.joint_stage import as_model
 from smajax.attribution.model_fits import Model, Search
 from smajax.core.result_cache import ResultCache

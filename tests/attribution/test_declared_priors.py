@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from smajax.attribution.declared_priors import overridden
+from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.joint_parameters import JointParameters
-from smajax.attribution.joint_search import JointSearch, search_jointly
+from smajax.attribution.joint_search import search_jointly
 from smajax.core.parameters import parameter_values, parameters
 from smajax.core.result_cache import ResultCache
 from smajax.data.experiment.record import DeclaredPriors, PriorSpread

@@ -7,7 +7,7 @@ import pytest
 
 from smajax.attribution import joint_search, traces
 from smajax.attribution.exclusive_effects import exclude_each_other, in_another_way, replaceable
-from smajax.attribution.joint_search import JointSearch
+from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model
 from smajax.attribution.model_fits import Search
 from smajax.attribution.subset_evidence import LinearModel, linear_model

@@ -10,8 +10,9 @@ import pytest
 
 from smajax.attribution import joint_search
 from smajax.attribution.detectable_effects import detectable
+from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.joint_parameters import JointParameters
-from smajax.attribution.joint_search import JointSearch, search_jointly
+from smajax.attribution.joint_search import search_jointly
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model
 from smajax.attribution.leave_one_run_out import left_out
 from smajax.attribution.program_fits import MOST_WIDENED, BegunFit, comparison_settings, models_by_program

@@ -118,12 +118,17 @@ def _stage_and_search(
 
     monkeypatch.setattr(joint_stage, "asked_for", asked_for)
 
-    def fitted_alone(search: Any, effects: Sequence[str], error: float, most: int | None = None) -> list[Any]:
-        # Of the function's equation, or the likeliest of all, without what was excluded.
-        assert list(effects) == (["sensor_drift"] if most is None else ["latent_heat", "sensor_drift"])
-        return [one for one in alone if one.effects[0] in effects]
+    def fitted_alone(search: Any, effects: Sequence[str], error: float) -> list[Any]:
+        # Of the function's equation, without what was excluded.
+        assert list(effects) == ["sensor_drift"]
+        return list(alone)
+
+    def likeliest_alone(search: Any, effects: Sequence[str], found: Any) -> list[Any]:
+        assert list(effects) == ["latent_heat", "sensor_drift"]
+        return list(alone)
 
     monkeypatch.setattr(joint_stage, "fitted_alone", fitted_alone)
+    monkeypatch.setattr(joint_stage, "likeliest_alone", likeliest_alone)
     search = SimpleNamespace(
         fitted={(): _model((), 9.0, 0.0)},
         error=lambda model: float(model.residual[0]),

@@ -9,8 +9,8 @@ from types import MappingProxyType
 import jax.numpy as jnp
 import numpy as np
 
+from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.joint_parameters import JointParameters
-from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.run_extent import extent_of
 from smajax.core.parameters import parameter_values, parameters, set_parameters
 from smajax.fit.levenberg_marquardt import FitSettings

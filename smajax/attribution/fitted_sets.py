@@ -1,0 +1,71 @@
+"""The sets of effects that a joint search has fitted, with their evidence, its settings, and its rounds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from smajax.attribution.joint_parameters import JointParameters
+from smajax.attribution.laplace_evidence import FittedModel, independent_error
+from smajax.attribution.unknown.search import AskedFor
+from smajax.fit.levenberg_marquardt import FitSettings
+from smajax.model.effects.candidate import Extent
+
+
+@dataclass
+class JointSearch:
+    """Settings of the search, and every model fitted in it."""
+
+    joint: JointParameters
+    extent: Extent
+    settings: FitSettings
+    noise: float  # of a sample, SI
+    noise_given: bool = True  # by the experiment file; else estimated from neighbouring samples
+    fitted: dict[tuple[str, ...], FittedModel] = field(default_factory=dict)
+    trials: dict[tuple[str, ...], float] = field(
+        default_factory=dict
+    )  # error of a sample at which a set was fitted last
+    rounds: list[JointRound] = field(default_factory=list)
+    excluded: frozenset[str] = frozenset()  # candidates that no set may have
+    detectable: tuple[str, ...] = ()
+    programs: tuple[tuple[str, ...], ...] = ()  # effects that each program of the fits so far carries
+    winner: tuple[str, ...] = ()  # effects of the likeliest model when the search had ended
+    rounds_before: int = 0  # of an earlier search, from whose models this one begins
+    thorough: bool = True  # ends only where no effect of the likeliest model can be removed or replaced
+    on_round: Callable[[JointRound], None] = lambda _: None
+    # What the search goes on from in the place of a model of many effects, itself where nothing is to be sought beside it; None: as it is.
+    in_place_of_many: Callable[[FittedModel], FittedModel | None] = lambda _: None
+    # What it goes on from where it would end with a model; None: it ends.
+    before_the_end: Callable[[FittedModel], FittedModel | None] = lambda _: None
+    lacking: AskedFor | None = None  # unknown terms beside the base model, where they were asked for
+
+    def error(self, model: FittedModel) -> float:
+        """`independent_error` of what `model` leaves."""
+        return independent_error(model, self.noise, self.noise_given)
+
+    def error_of(self, effects: Sequence[str]) -> float:
+        """`error` of the fitted model with these effects."""
+        return self.error(self.fitted[self.joint.ordered(effects)])
+
+    def best(self, error: float) -> FittedModel:
+        """The likeliest model."""
+        return max(self.fitted.values(), key=lambda model: model.log_evidence(error**2))
+
+    def probabilities(self, error: float) -> dict[tuple[str, ...], float]:
+        """Of every fitted set, among these."""
+        values = np.asarray([model.log_evidence(error**2) for model in self.fitted.values()])
+        weights = np.exp(values - values.max())
+        return dict(zip(self.fitted, (weights / weights.sum()).tolist(), strict=True))
+
+
+@dataclass(frozen=True)
+class JointRound:
+    """One round: what was fitted, and what is likeliest since."""
+
+    error: float  # of an independent sample, SI
+    present: tuple[str, ...]
+    gains: tuple[tuple[tuple[str, ...], float, float], ...]  # (effects, log evidence over the present model's, rms SI)
+    best: tuple[str, ...]
+    best_gain: float  # log evidence of the best over the present model's
