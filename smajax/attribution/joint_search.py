@@ -87,6 +87,7 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
         gains = tuple(
             (effects, search.fitted[effects].log_evidence(error**2) - before, search.fitted[effects].rms)
             for effects in dict.fromkeys(_effects(search, one) for one in sets)
+            if effects in search.fitted  # a set whose fits have no number is none
         )
         done = JointRound(error, present.effects, gains, best.effects, gain)
         search.rounds.append(done)

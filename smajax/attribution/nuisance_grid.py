@@ -15,13 +15,11 @@ import numpy as np
 
 from smajax.attribution.model_fits import Model, Search, nudged
 from smajax.attribution.score_test import Score, ranked, samples_per_independent, score_of, switches, without
-from smajax.attribution.traces import by_program
-from smajax.fit.integration import with_integration
-from smajax.fit.outputs_of_runs import made_ready, slopes_at
+from smajax.attribution.traces import by_program, far_from, from_coarse_to_fine
+from smajax.fit.outputs_of_runs import made_ready, misfits, slopes_at
 from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.model.effects.library import LIBRARY
-from smajax.simulation.steppers import ONE_STEP
 
 
 @dataclass(frozen=True)
@@ -46,19 +44,17 @@ def scanned(
     `effects`, which are off, are each at the place whose trace promises most beside what the fitted parameters absorb. `looked_for`: as of
     `by_program`.
     """
-    parts, traces, shared = [], [], list(fitted)
     programs = by_program(effects, looked_for)
     restricted = [setting.restricted((*present, *together)) for together in programs]
-    problems = [with_integration(own, ONE_STEP) for own, _ in restricted]  # the programs of the search's traces
-    made_ready(problems)
-    for together, problem, (_, slots) in zip(programs, problems, restricted, strict=True):
-        names = [*shared, *(name for effect in together for name in setting.coefficients(effect))]
-        parts.append(sensitivity(problem, nudged(setting, values, together)[slots], names))
-        traces += _at_places(setting, problem, slots, values, together)
-        shared = []  # once is enough
-    first = parts[0]
+    own, index = setting.restricted(present)
+    misfit = misfits(own, [values[index]])[0] / np.asarray(own.noise)
+    slots = [slots for _, slots in restricted]
+    for problems in from_coarse_to_fine([problem for problem, _ in restricted]):  # the programs of the search's traces
+        parts, traces = _scanned_by(setting, values, fitted, programs, problems, slots)
+        if not far_from(parts[0].misfit, misfit):
+            break
     jacobian = np.concatenate([one.jacobian for one in parts], axis=-1)
-    at = Sensitivity(tuple(name for one in parts for name in one.names), first.misfit, jacobian, first.mask)
+    at = Sensitivity(tuple(name for one in parts for name in one.names), misfit, jacobian, parts[0].mask)
     found = Scanned(at)
     basis, residual = without(at, fitted)
     correlation = samples_per_independent(at)
@@ -76,11 +72,34 @@ def scanned(
     return found
 
 
+Places = list[tuple[str, dict[str, float], dict[str, np.ndarray]]]
+
+
+def _scanned_by(
+    setting: Search,
+    values: np.ndarray,
+    fitted: Sequence[str],
+    programs: Sequence[Sequence[str]],
+    problems: Sequence[Problem],
+    slots: Sequence[Sequence[int]],
+) -> tuple[list[Sensitivity], Places]:
+    """(sensitivities by program, what `_at_places` gives of all) by `problems`; `slots`: of the parameters of each among all."""
+    parts: list[Sensitivity] = []
+    traces: Places = []
+    made_ready(problems)
+    for together, problem, own in zip(programs, problems, slots, strict=True):
+        # What is fitted from the first: once is enough.
+        names = [*(() if parts else fitted), *(name for effect in together for name in setting.coefficients(effect))]
+        parts.append(sensitivity(problem, nudged(setting, values, together)[own], names))
+        traces += _at_places(setting, problem, own, values, together)
+    return parts, traces
+
+
 def _at_places(
     setting: Search, problem: Problem, slots: Sequence[int], values: np.ndarray, effects: Sequence[str]
-) -> list[tuple[str, dict[str, float], dict[str, np.ndarray]]]:
+) -> Places:
     """(effect, a place of its grid, columns (series, N) of its switches there), by full names. `slots`: of the parameters of `problem` among all."""
-    found: list[tuple[str, dict[str, float], dict[str, np.ndarray]]] = []
+    found: Places = []
     points, names = [], []
     for effect in effects:
         for grid in LIBRARY[effect].candidate.grid(setting.extent):

@@ -29,6 +29,9 @@ from smajax.fit.uncertainty import at_bound
 
 Subset = frozenset[Variant]
 WIDTHS = tuple(2.0**power for power in range(7))  # factors of an effect's widths that are compared
+MOST_EFFECTS = (
+    6  # of a set: more that leave more than noise stand in for something else, and a search among them does not end
+)
 IMPOSSIBLE = 6.0  # standard errors on the wrong side of zero
 FREE_OF_BOUNDS = 1e-6  # of the range: nearer to a bound an unknown is held
 
@@ -68,7 +71,9 @@ class LinearModel:
         return self.cached[subset]
 
     def _log_evidence(self, subset: Subset) -> float:
-        if exclude_each_other([one.effect for one in subset]):
+        if len(subset) > max(MOST_EFFECTS, len(self.traces.present)) or exclude_each_other(
+            [one.effect for one in subset]
+        ):
             return -np.inf
         columns = self._columns(subset)
         try:

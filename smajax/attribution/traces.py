@@ -6,7 +6,7 @@ it: an effect may give several places at which to look (`Candidate.grid`), and e
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -21,6 +21,8 @@ from smajax.fit.problem import Problem
 from smajax.model.effects.candidate import Extent
 from smajax.model.effects.library import LIBRARY
 from smajax.simulation.steppers import ONE_STEP
+
+MOST_OFF = 1.0  # of what a model leaves, root mean square: what one step a sample may be off by where derivatives are taken by it
 
 
 class Variant(NamedTuple):
@@ -52,31 +54,71 @@ def traces_at(
     """Residual of a fitted model and derivatives there; effects that are off are switched on by `NUDGE` for theirs.
 
     `candidates`: effects that are looked at beside those of the model; None: all. `looked_for`: as of `by_program`. Derivatives by one step of the integration a
-    sample: they only say which sets of effects are worth a fit.
+    sample, which only say which sets of effects are worth a fit, unless that is far off.
     """
     values, present = model.values, model.effects
     among = joint.coefficients if candidates is None else joint.ordered((*present, *candidates))
     absent = [effect for effect in among if effect not in present]
-    columns: dict[str, np.ndarray] = {}
-    variants: dict[Variant, Mapping[str, np.ndarray]] = {}
-    places: dict[Variant, Mapping[str, float]] = {}
-    shared = joint.free([effect for effect in among if effect in present])
     programs = by_program(absent, looked_for)
     restricted = [joint.restricted((*present, *together)) for together in programs]
-    problems = [with_integration(problem, ONE_STEP) for problem, _ in restricted]
-    made_ready(problems)
-    for together, problem, (_, index) in zip(programs, problems, restricted, strict=True):
-        names = [*shared, *(name for effect in together for name in joint.coefficients[effect])]
-        _, found = residual_and_columns(problem, _nudged(joint, values, together)[index], names)
-        columns |= found
-        shared = []  # once is enough
-        own = _places(joint, together, extent)
-        variants |= _elsewhere(joint, problem, index, values, own)
-        places |= own
+    shared = joint.free([effect for effect in among if effect in present])
+    for problems in from_coarse_to_fine([problem for problem, _ in restricted]):
+        residual, columns, variants, places = _traced(joint, values, shared, programs, problems, restricted, extent)
+        if not far_from(residual, model.residual):
+            break
     by_themselves = {
         Variant(effect, -1): {name: columns[name] for name in joint.coefficients[effect]} for effect in among
     }
     return Traces(np.asarray(values), present, model.residual, columns, {**by_themselves, **variants}, places)
+
+
+def from_coarse_to_fine(problems: Sequence[Problem]) -> Iterator[list[Problem]]:
+    """By one step a sample, and by their own integration."""
+    yield [with_integration(problem, ONE_STEP) for problem in problems]
+    yield list(problems)
+
+
+def far_from(coarse: np.ndarray, own: np.ndarray) -> bool:
+    """Whether misfits by one step a sample are off by as much as the model leaves: their derivatives then are not the model's.
+
+    A step of a slider that turns may be too long for its stages to be solved at all.
+    """
+    return not float(np.mean((coarse - own) ** 2)) <= MOST_OFF**2 * float(np.mean(own**2))
+
+
+def _traced(
+    joint: JointParameters,
+    values: np.ndarray,
+    shared: Sequence[str],
+    programs: Sequence[Sequence[str]],
+    problems: Sequence[Problem],
+    restricted: Sequence[tuple[Problem, np.ndarray]],
+    extent: Extent,
+) -> tuple[
+    np.ndarray,
+    dict[str, np.ndarray],
+    dict[Variant, Mapping[str, np.ndarray]],
+    dict[Variant, Mapping[str, float]],
+]:
+    """(residual, columns, columns of variants, their places) by `problems`; `shared`: parameters that are free without any effect more."""
+    columns: dict[str, np.ndarray] = {}
+    variants: dict[Variant, Mapping[str, np.ndarray]] = {}
+    places: dict[Variant, Mapping[str, float]] = {}
+    residual = np.zeros(0)
+    made_ready(problems)
+    for together, problem, (_, index) in zip(programs, problems, restricted, strict=True):
+        # Those that all programs share from the first: once is enough.
+        names = [
+            *(() if columns else shared),
+            *(name for effect in together for name in joint.coefficients[effect]),
+        ]
+        own, found = residual_and_columns(problem, _nudged(joint, values, together)[index], names)
+        residual = residual if columns else own
+        columns |= found
+        there = _places(joint, together, extent)
+        variants |= _elsewhere(joint, problem, index, values, there)
+        places |= there
+    return residual, columns, variants, places
 
 
 def by_program(effects: Sequence[str], looked_for: Sequence[str] | None = None) -> list[list[str]]:

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from smajax.attribution import joint_search
+from smajax.attribution import fitted_sets, joint_search, subset_evidence, traces
 from smajax.attribution.detectable_effects import detectable
 from smajax.attribution.fitted_sets import JointSearch
-from smajax.attribution.joint_parameters import JointParameters
+from smajax.attribution.joint_parameters import JointParameters, residual_and_columns
 from smajax.attribution.joint_search import search_jointly
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model
 from smajax.attribution.leave_one_run_out import left_out
@@ -20,11 +20,13 @@ from smajax.attribution.set_starts import PLACES, starts
 from smajax.attribution.subset_evidence import likeliest_width, linear_model
 from smajax.attribution.traces import Variant, traces_at
 from smajax.core.parameters import parameter_values, parameters
+from smajax.fit.integration import with_integration
 from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
 from smajax.fit.outputs_of_runs import misfits
 from smajax.fit.preset_priors import preset_priors
 from smajax.fit.starts import logarithmic_points
 from smajax.model.effects.library import LIBRARY
+from smajax.simulation.steppers import Integration
 from tests.helpers.hot_weight import CANDIDATES, NOISE, UNKNOWNS, hot_weight
 from tests.helpers.often import often
 
@@ -117,6 +119,53 @@ def test_a_search_goes_on_from_what_is_named_before_its_end(monkeypatch: pytest.
     assert [(done.present, done.best) for done in search.rounds if done.best != done.present] == [
         ((), ("latent_heat",))
     ]
+
+
+def test_a_set_whose_fits_have_no_number_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The search goes on among the others; it ended in a KeyError."""
+    monkeypatch.setattr(
+        joint_search,
+        "models_by_program",
+        lambda *given: (model for model in models_by_program(*given) if "phase_resistance" not in model.effects),
+    )
+    search, values, _ = _found({"latent_heat.enthalpy": 1.2e4})
+    assert set(values) == {"latent_heat.enthalpy"}
+    assert any("phase_resistance" in effects for effects in search.trials)
+    assert not any("phase_resistance" in effects for done in search.rounds for effects, _, _ in done.gains)
+
+
+def test_no_set_has_more_effects_than_a_search_among_them_ends_with(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(subset_evidence, "MOST_EFFECTS", 1)
+    search, _, _ = _found({"latent_heat.enthalpy": 1.2e4, "phase_resistance.contrast": -0.2})
+    assert {len(effects) for effects in search.fitted} == {0, 1}
+
+
+@pytest.mark.parametrize(("most_off", "steps"), [(1e3, [1]), (1e-6, [1, 4])])
+def test_derivatives_are_the_models_own_where_one_step_a_sample_is_far_off(
+    monkeypatch: pytest.MonkeyPatch, most_off: float, steps: list[int]
+) -> None:
+    search = hot_weight({"latent_heat.enthalpy": 1.2e4})
+    problem = with_integration(search.joint.problem, Integration(substeps=4))
+    joint = dataclasses.replace(search.joint, problem=problem)
+    base = fitted_model(joint, (), problem.start_values(), ())
+    taken: dict[int, Any] = {}
+
+    def recorded(problem: Any, *given: Any) -> Any:
+        residual, columns = residual_and_columns(problem, *given)
+        taken.setdefault(problem.batch.integration.substeps, columns)
+        return residual, columns
+
+    monkeypatch.setattr(traces, "residual_and_columns", recorded)
+    monkeypatch.setattr(traces, "MOST_OFF", most_off)
+    found = traces_at(joint, base, search.extent)
+    assert list(taken) == steps
+    assert found.columns["recoverable_strain"] is taken[steps[-1]]["recoverable_strain"]
+
+
+def test_what_has_no_number_is_far_off() -> None:
+    assert traces.far_from(np.asarray([np.nan, 1.0]), np.asarray([1.0, 1.0]))
+    assert traces.far_from(np.asarray([3.0, 1.0]), np.asarray([1.0, 1.0]))
+    assert not traces.far_from(np.asarray([1.5, 1.0]), np.asarray([1.0, 1.0]))
 
 
 def _with_narrow_priors(search: JointSearch, narrower: float) -> JointSearch:
@@ -347,7 +396,7 @@ def test_two_models_that_are_as_likely_do_not_take_turns(monkeypatch: pytest.Mon
     one, other = _Alike(("creep",), 1.0, 0.2), _Alike(("slack",), 1.02, 0.2)
     search: Any = JointSearch(*([_Nothing()] * 4))  # type: ignore[arg-type]
     search.fitted = {one.effects: one, other.effects: other}
-    monkeypatch.setattr(joint_search, "independent_error", lambda model, *_: model.rms)
+    monkeypatch.setattr(fitted_sets, "independent_error", lambda model, *_: model.rms)
     monkeypatch.setattr(joint_search, "_grouped", lambda *_: [])
     monkeypatch.setattr(joint_search, "_fit_side_by_side", lambda *_, **__: None)
     monkeypatch.setattr(joint_search, "_linear", lambda *_: (None, None))
