@@ -37,6 +37,7 @@ from smajax.report.html import findings_to_html
 from smajax.report.json_file import findings_to_json
 from smajax.report.narrative import narrate, narrated
 from smajax.report.narrative.rounds import reason_text
+from smajax.report.narrative.verdict import STAND_INS, headline, summary
 from tests.helpers.made_findings import made_effect, made_findings, made_residual
 
 
@@ -157,6 +158,20 @@ def test_each_cluster_of_correlated_parameters_has_one_line_with_advice() -> Non
     (advice,) = [one for one in limits if one.startswith("Of density these runs determine combinations alone.")]
     assert "`smajax identify experiment.toml --design`" in advice
     assert any(one.startswith("damping: determined by its prior") for one in limits)
+
+
+def test_many_effects_that_leave_more_than_noise_are_said_to_stand_in() -> None:
+    (one,) = [effect for effect in made_findings().effects if effect.added]
+    few, many = (
+        dataclasses.replace(made_findings(), verdict=Verdict.PARTLY_EXPLAINED, effects=(one,) * count)
+        for count in (STAND_INS - 1, STAND_INS)
+    )
+    assert "may in part stand in" in summary(few)[0]
+    assert headline(few)[1] == "fair"
+    said = summary(many)
+    assert "take none of them for found" in said[0]
+    assert headline(many)[1] == "poor"
+    assert len(said) < len(summary(few))  # what each of them means is not said
 
 
 def test_a_parameter_at_its_bound_is_reported_at_the_top() -> None:

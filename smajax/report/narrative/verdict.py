@@ -40,6 +40,8 @@ VERDICTS = {
 }
 
 
+STAND_INS = 5  # effects that leave more than noise all the same: no bench lacks so many and one more
+MANY_STAND_IN = ("Something is missing that effects of the library only imitate", "poor")
 AT_A_BOUND = ("Explained, but by what ends at a bound", "fair")
 UNKNOWN_AT_A_BOUND = {
     Verdict.ADEQUATE: ("Adequate, but an unknown ends at a bound", "fair"),
@@ -53,7 +55,12 @@ def headline(findings: Findings) -> tuple[str, str]:
         return AT_A_BOUND
     if unknowns_at_bounds(findings):
         return UNKNOWN_AT_A_BOUND[findings.verdict]
-    return VERDICTS[findings.verdict]
+    return MANY_STAND_IN if _stand_in(findings) else VERDICTS[findings.verdict]
+
+
+def _stand_in(findings: Findings) -> bool:
+    """Whether so many effects leave more than noise that they describe something else together."""
+    return findings.verdict is Verdict.PARTLY_EXPLAINED and len(findings.added) >= STAND_INS
 
 
 def summary(findings: Findings) -> tuple[str, ...]:
@@ -83,7 +90,7 @@ def summary(findings: Findings) -> tuple[str, ...]:
     sentences += caveats.of_priors_left(findings)
     unnamed = caveats.zero_so_far(findings)
     for effect in findings.added:
-        if effect in unnamed:
+        if effect in unnamed or _stand_in(findings):
             continue
         fitted = {name: (one.value, one.standard_error) for name, one in effect.coefficients.items()}
         values = {name: value for name, (value, _) in fitted.items()}
@@ -175,8 +182,14 @@ def _partly(findings: Findings) -> str:
         text += f"; alone it takes the fit runs from {before} to {error_text(findings, alone)}"
     if not others:
         return f"{text}. That explains part of the misfit: what is left is more than noise."
+    text += f". The model is likelier still with {and_listed([effect.title for effect in others])}"
+    if _stand_in(findings):
+        return (
+            f"{text}. So many effects that leave more than noise all the same rather stand in for something that the library does not "
+            "hold than describe what is missing: take none of them for found."
+        )
     return (
-        f"{text}. The model is likelier still with {and_listed([effect.title for effect in others])}. More than noise is left all the same: "
+        f"{text}. More than noise is left all the same: "
         "something that the library does not hold may be missing too, and "
         f"{'these' if len(others) > 1 else 'this'} may in part stand in for it."
     )
