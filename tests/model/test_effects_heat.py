@@ -5,6 +5,7 @@ from __future__ import annotations
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 from smajax.model.effects.end_conduction import DEPTH, EndConduction
 from smajax.model.extended import extended
@@ -21,6 +22,36 @@ def test_a_draught_cools_from_its_time_on() -> None:
     # Martensite all the time, so that the power is the same: the loss is it in both cases.
     assert run.martensite_fraction.min() > 0.999
     assert 1.5 * blown == pytest.approx(calm, rel=1e-6)
+
+
+def test_surroundings_warm_up_a_time_constant_late_and_keep_the_wire_warm() -> None:
+    """Against the closed form of the two heat balances, which are linear while the wire stays martensite."""
+    system = RIGS["dead_weight"][0]
+    share, tau, volts, dt = 0.4, 8.0, 2.0, 0.02
+    on = {"warmed_surroundings.share": share, "warmed_surroundings.time_constant": tau}
+    heated = jnp.arange(4001) < 2000
+    run = simulate_compiled(
+        extended(system, ("warmed_surroundings",), on), {"voltage": jnp.where(heated, volts, 0.0)}, dt
+    )
+    assert run.martensite_fraction.min() > 0.999
+    wire = system.wire
+    air, temperature = float(wire.heat.ambient_temperature), np.asarray(run.temperature)
+    m_c = float(mass_per_metre(wire) * wire.heat.specific_heat)
+    loss = float(heat_lost(system, air + 1.0) - heat_lost(system, air))
+    rate = np.asarray(
+        [[-loss / m_c, share * loss / m_c], [1.0 / tau, -1.0 / tau]]
+    )  # of the excesses of wire and late temperature
+    power = np.asarray([volts**2 / float(resistance(system, 1.0)) / float(wire.wire_length) / m_c, 0.0])
+    excess = np.zeros(2)
+    expected = [0.0]
+    one = expm(rate * dt)
+    for on_now in np.asarray(heated)[:-1]:
+        rest = np.linalg.solve(-rate, power) if on_now else np.zeros(2)
+        excess = rest + one @ (excess - rest)
+        expected.append(float(excess[0]))
+    assert temperature - air == pytest.approx(np.asarray(expected), rel=1e-3, abs=2e-3)
+    # In the end, to e^-3.7 of the slower balance, the wire is hotter by 1/(1 - w) than in air that stays cool.
+    assert temperature[1999] - air == pytest.approx(power[0] * m_c / loss / (1.0 - share), rel=0.03)
 
 
 def test_a_specific_heat_by_phase_changes_the_time_and_not_the_end_state() -> None:

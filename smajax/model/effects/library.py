@@ -25,6 +25,7 @@ _NAMES = (
     "radiation",
     "ambient_drift",
     "draught",
+    "warmed_surroundings",
     "phase_specific_heat",
     "end_conduction",
     "phase_resistance",
