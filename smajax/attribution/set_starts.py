@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from smajax.attribution.exclusive_effects import replaceable
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.subset_evidence import LinearModel, Subset
 from smajax.attribution.traces import Traces, Variant
@@ -21,7 +22,7 @@ def starts(joint: JointParameters, subset: Subset, linear: LinearModel, traces: 
     """Where a fit of a set may begin, (P,) each: new coefficients at their linear estimate, unknowns where they are and there too.
 
     An effect with several local minima gives ranges of its coefficients (`Candidate.start_ranges`), all over which it is tried, or other
-    places (`Candidate.further_starts`).
+    places (`Candidate.further_starts`). One in the place of another that looks much the same begins with that one's coefficients of the same name as well.
     """
     slots, estimate = joint.slots, linear.estimate(subset)
     values = joint.without(traces.values, [variant.effect for variant in subset])
@@ -37,6 +38,8 @@ def starts(joint: JointParameters, subset: Subset, linear: LinearModel, traces: 
     points = [values, moved]
     for variant in new:
         points += _elsewhere(joint, variant.effect, moved)
+    taken_over = _in_the_place_of(joint, subset, traces, moved)
+    points += [] if taken_over is None else [taken_over]
     return [_off_bounds(joint, one) for one in points]
 
 
@@ -72,6 +75,26 @@ def _begin(
             value = prior.base + size * prior.sigma
         values[name] = float(np.clip(value, *bounds))
     return values
+
+
+def _in_the_place_of(joint: JointParameters, subset: Subset, traces: Traces, values: np.ndarray) -> np.ndarray | None:
+    """`values` with new effects' coefficients at those of the same name of a present effect that they replace; None where they replace none.
+
+    A limit of friction was found with the stick and slip of its runs, which a start elsewhere need not come to.
+    """
+    effects = {variant.effect for variant in subset}
+    pairs = [
+        (new, gone)
+        for new in effects - set(traces.present)
+        for gone in set(traces.present) - effects
+        if replaceable(new, gone)
+    ]
+    changed = np.array(values)
+    for new, gone in pairs:
+        for name in joint.coefficients[new]:
+            if (there := f"{gone}.{name.split('.', 1)[1]}") in joint.coefficients[gone]:
+                changed[joint.slots[name]] = np.clip(traces.values[joint.slots[there]], *joint.bounds[name])
+    return changed if pairs else None
 
 
 def _elsewhere(joint: JointParameters, effect: str, values: np.ndarray) -> list[np.ndarray]:

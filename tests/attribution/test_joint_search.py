@@ -349,6 +349,23 @@ def test_starts_of_a_stribeck_friction_cover_its_sizes_and_speeds() -> None:
     assert LIBRARY["latent_heat"].candidate.start_ranges({"enthalpy": 6e3}) == {}
 
 
+def test_a_friction_in_the_place_of_another_begins_where_that_one_was() -> None:
+    frictions = ("coulomb_friction", "stribeck_friction")
+    search = hot_weight({}, frictions)
+    joint, slots = search.joint, search.joint.slots
+    values = joint.problem.start_values()
+    values[slots["stribeck_friction.limit"]], values[slots["stribeck_friction.bend"]] = 0.7, 3e-6
+    traces = traces_at(joint, fitted_model(joint, frictions[1:], values, frictions[1:]), search.extent)
+    linear = linear_model(joint, traces, NOISE**2, frictions)
+    coulomb = Variant(frictions[0], -1)
+    point = starts(joint, frozenset({coulomb}), linear, traces)[-1]
+    assert [point[slots[f"coulomb_friction.{name}"]] for name in ("limit", "bend")] == [0.7, 3e-6]
+    assert point[slots["stribeck_friction.limit"]] == 0.0
+    # Beside the other it replaces none.
+    both = frozenset({coulomb, Variant(frictions[1], -1)})
+    assert all(point[slots["coulomb_friction.bend"]] != 3e-6 for point in starts(joint, both, linear, traces))
+
+
 def test_starts_of_a_backlash_lie_beyond_its_linear_estimate() -> None:
     """The estimate is that of a play taken up at once."""
     ranges = LIBRARY["sensor_backlash"].candidate.start_ranges({"half_width": 0.01})
