@@ -61,6 +61,7 @@ class LinearModel:
     log_odds: dict[Variant, float]
     squares: float  # of the outputs where all coefficients are at their base, SI squared
     variance: float  # of an independent sample, SI squared
+    most_effects: int = MOST_EFFECTS  # of a set
     width_factors: dict[str, float] = field(default_factory=dict)  # of the priors of effects that are off
     cached: dict[Subset, float] = field(default_factory=dict)
 
@@ -71,9 +72,7 @@ class LinearModel:
         return self.cached[subset]
 
     def _log_evidence(self, subset: Subset) -> float:
-        if len(subset) > max(MOST_EFFECTS, len(self.traces.present)) or exclude_each_other(
-            [one.effect for one in subset]
-        ):
+        if len(subset) > self.most_effects or exclude_each_other([one.effect for one in subset]):
             return -np.inf
         columns = self._columns(subset)
         try:
@@ -190,6 +189,7 @@ def linear_model(joint: JointParameters, traces: Traces, variance: float, candid
         log_odds=_odds(joint, places),
         squares=float(target @ target),
         variance=variance,
+        most_effects=max(MOST_EFFECTS, len(traces.present)),
     )
     _widen(linear)
     return linear

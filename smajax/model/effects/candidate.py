@@ -28,7 +28,7 @@ PRIOR_ODDS: Mapping[PriorClass, float] = MappingProxyType({"material": 0.1, "ben
 # `Candidate.exclusive_group` of the effects that change how the transformation runs through its range.
 TRANSFORMATION_SHAPE = "shape of the transformation"
 DELAY = "delay"
-FRICTION = "friction"
+LOST_MOTION = "lost motion where it turns"
 
 Scale = Literal["", "stroke", "increment", "run", "load", "1/run", "stroke/run"]
 SCALES: tuple[str, ...] = get_args(Scale)

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import FRICTION, Candidate, Width
+from smajax.model.effects.candidate import LOST_MOTION, Candidate, Width
 from smajax.model.load.friction import PRESLIDING, FrictionTerm
 from smajax.model.types import Scalar
 
@@ -41,7 +41,7 @@ class CoulombFriction(AbstractEffect, FrictionTerm):
         switches=("limit",),
         initial_guess={"limit": 0.1, "bend": PRESLIDING},
         prior_class="bench",
-        similar_group=FRICTION,
+        similar_group=LOST_MOTION,
         widths={
             "limit": LIMIT_WIDTH,
             "bend": BEND_WIDTH,

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import FRICTION, Actuator, Candidate, Width
+from smajax.model.effects.candidate import LOST_MOTION, Actuator, Candidate, Width
 from smajax.model.effects.coulomb_friction import BEND_WIDTH, presliding_parameter
 from smajax.model.load.friction import PRESLIDING, FrictionTerm
 from smajax.model.types import Scalar
@@ -40,7 +40,7 @@ class PulleyFriction(AbstractEffect, FrictionTerm):
         initial_guess={"share": 0.02, "bend": PRESLIDING},
         applies=_applies,
         prior_class="bench",
-        similar_group=FRICTION,
+        similar_group=LOST_MOTION,
         widths={
             "share": SHARE_WIDTH,
             "bend": BEND_WIDTH,

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import FRICTION, Candidate
+from smajax.model.effects.candidate import LOST_MOTION, Candidate
 from smajax.model.effects.coulomb_friction import BEND_WIDTH, presliding_parameter
 from smajax.model.effects.pulley_friction import SHARE_WIDTH, PulleyFriction
 from smajax.model.effects.stribeck_friction import SLIDING_WIDTH, SPEED_WIDTH, all_over, falling
@@ -48,7 +48,7 @@ class PulleyStribeckFriction(AbstractEffect, FrictionTerm):
         start_ranges=_start_ranges,
         applies=PulleyFriction.candidate.applies,
         prior_class="bench",
-        similar_group=FRICTION,
+        similar_group=LOST_MOTION,
         widths={
             "share": SHARE_WIDTH,
             "sliding": SLIDING_WIDTH,

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate, Extent, Width
+from smajax.model.effects.candidate import LOST_MOTION, Candidate, Extent, Width
 from smajax.model.sensor_reading import SensorTerm
 from smajax.model.types import Scalar
 
@@ -42,6 +42,7 @@ class SensorBacklash(AbstractEffect, SensorTerm):
         bounds=_bounds,
         start_ranges=_start_ranges,
         prior_class="bench",
+        similar_group=LOST_MOTION,
         widths={
             "half_width": Width(0.01, "couplings and gears of sensors: 0.1 to 2 % of the stroke", of="stroke"),
         },

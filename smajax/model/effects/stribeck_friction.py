@@ -9,7 +9,7 @@ import jax.numpy as jnp
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import FRICTION, Candidate, Width
+from smajax.model.effects.candidate import LOST_MOTION, Candidate, Width
 from smajax.model.effects.coulomb_friction import BEND_WIDTH, LIMIT_WIDTH, presliding_parameter
 from smajax.model.load.friction import PRESLIDING, FrictionTerm
 from smajax.model.types import Scalar
@@ -70,7 +70,7 @@ class StribeckFriction(AbstractEffect, FrictionTerm):
         stick_slip=True,
         start_ranges=_start_ranges,
         prior_class="bench",
-        similar_group=FRICTION,
+        similar_group=LOST_MOTION,
         widths={
             "limit": LIMIT_WIDTH,
             "sliding": SLIDING_WIDTH,
