@@ -55,7 +55,7 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
             search.fitted[effects] = fitted_model(search.joint, effects, starts[effects], program)
     error = min(search.error(model) for model in search.fitted.values())
     # All to their end, however far behind: the base model is what every result is held against.
-    begun = [BegunFit(effects, values) for effects, values in starts.items()]
+    begun = [BegunFit(effects, values, search.fitted[effects].width_factors) for effects, values in starts.items()]
     _fit_side_by_side(search, begun, error, "fitting what the search begins with", compared=False)
     present = search.best(error)
     error = search.error(present)
@@ -255,7 +255,9 @@ def likeliest_alone(search: JointSearch, effects: Sequence[str], found: FittedMo
     """The base model with one of `effects` each that has come near to `found`, of the `NEIGHBOURS` that the linear model about the base model finds likeliest."""
     error = search.error(found)
     fresh = [effect for effect in effects if _fresh(search, (effect,), error)]
-    _fit_alone(search, fresh, error, NEIGHBOURS, found.squares / error**2)
+    # One effect is owed what the coefficients of many cost, and no more than a model without any.
+    owed = found.cost_of_coefficients(error**2) - search.fitted[()].cost_of_coefficients(error**2)
+    _fit_alone(search, fresh, error, NEIGHBOURS, found.squares / error**2 + 2.0 * max(owed, 0.0))
     return [search.fitted[effect,] for effect in effects if (effect,) in search.fitted]
 
 
@@ -287,7 +289,7 @@ def _fit(
 
     `least_cost`: of another model at this error, which fits that fall far behind are not worth their time beside.
     """
-    joint = dataclasses.replace(search.joint, width_factors={**linear.width_factors, **search.joint.width_factors})
+    joint = dataclasses.replace(search.joint, width_factors={**search.joint.width_factors, **linear.width_factors})
     begun: list[BegunFit] = []
     groups = _grouped(search, [_effects(search, subset) for subset in sets])
     restricted = [joint.restricted(program) for program, _ in groups]
@@ -350,5 +352,7 @@ def fitted_from(search: JointSearch, model: FittedModel) -> FittedModel:
     """The effects of `model`, fitted with every free parameter of `search` from its values; `model` where that fit has no number."""
     error = search.error(model)
     stage = "fitting the base model with the values of presets free"
-    _fit_side_by_side(search, [BegunFit(model.effects, model.values)], error, stage, compared=False)
+    _fit_side_by_side(
+        search, [BegunFit(model.effects, model.values, model.width_factors)], error, stage, compared=False
+    )
     return search.fitted.get(model.effects, model)

@@ -283,7 +283,7 @@ def _kept_at_half_step(
 
 def refined(search: JointSearch, model: FittedModel, error: float) -> FittedModel:
     """A fitted model taken to its optimum, which standard errors need; `error` of an independent sample, SI."""
-    joint = search.joint
+    joint = dataclasses.replace(search.joint, width_factors=model.width_factors)
     problem, index = joint.restricted(model.effects)
     problem = problem.with_noise(error)
     task = problem.task(model.names, joint.bounds, model.values[index])

@@ -56,6 +56,10 @@ class FittedModel:
             value += sum(float(np.log(2.0) + scipy.stats.norm.logcdf(at / deviation[k])) for k, at in self.one_sided)
         return value
 
+    def cost_of_coefficients(self, variance: float) -> float:
+        """What the log evidence lacks beside the residual's part: priors, odds and widths against errors."""
+        return -self.log_evidence(variance) - 0.5 * self.squares / variance
+
     def covariance(self, variance: float) -> np.ndarray:
         """Posterior covariance of the free parameters, in widths of their priors."""
         values, vectors, size = self._decomposed(variance)

@@ -89,7 +89,7 @@ def models_by_program(
     """The models that fits of sets of effects end at, as `fits_by_program`; of several fits of one set that of the least cost.
 
     An effect that ends farther off than its priors are wide is fitted again with the widths that are likeliest there (`width_factor`), until they
-    stay, `most_widened` times at most; each time the model comes as well. Where much is left a sample says little, and priors of the usual
+    are wide enough, `most_widened` times at most; each time the model comes as well. Where much is left a sample says little, and priors of the usual
     width would hold an effect that is far larger than usual next to nothing, so that others took its place.
     """
     for number in range(1 + most_widened):

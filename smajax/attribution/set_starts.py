@@ -85,8 +85,8 @@ def _in_the_place_of(joint: JointParameters, subset: Subset, traces: Traces, val
     effects = {variant.effect for variant in subset}
     pairs = [
         (new, gone)
-        for new in effects - set(traces.present)
-        for gone in set(traces.present) - effects
+        for new in joint.ordered(tuple(effects - set(traces.present)))
+        for gone in joint.ordered(tuple(set(traces.present) - effects))
         if replaceable(new, gone)
     ]
     changed = np.array(values)

@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from smajax.attribution import nuisance_grid
 from smajax.attribution.model_fits import Model, Search, nudged
 from smajax.attribution.nuisance_grid import scanned, scores_at
 from smajax.attribution.run_extent import extent_of
 from smajax.core.parameters import parameters, set_parameters
 from smajax.core.result_cache import ResultCache
+from smajax.fit.integration import with_integration
+from smajax.fit.outputs_of_runs import misfits
 from smajax.fit.packed_runs import RunBatch, simulate_batch
 from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import sensitivity
 from smajax.model.extended import extended
 from smajax.model.presets import build
+from smajax.simulation.steppers import Integration
 
 DT, SAMPLES, NOISE = 0.1, 300, 1e-5
 EFFECTS = ("draught", "radiation")
@@ -70,3 +75,26 @@ def test_a_score_is_corrected_for_the_number_of_places_scanned() -> None:
     extent = extent_of(setting.problem)
     assert extent.seconds == pytest.approx(DT * SAMPLES)
     assert extent.stroke == pytest.approx(float(np.ptp(setting.problem.measured, axis=1).max()))
+
+
+@pytest.mark.parametrize("far", [False, True])
+def test_scores_are_the_models_own_where_one_step_a_sample_is_far_off(
+    monkeypatch: pytest.MonkeyPatch, far: bool
+) -> None:
+    setting = _setting(12.0, 7.5)
+    setting = dataclasses.replace(setting, problem=with_integration(setting.problem, Integration(substeps=3)))
+    taken = []
+
+    def recorded(problem: Any, *given: Any) -> Any:
+        taken.append(problem.batch.integration.substeps)
+        return sensitivity(problem, *given)
+
+    monkeypatch.setattr(nuisance_grid, "sensitivity", recorded)
+    monkeypatch.setattr(nuisance_grid, "far_from", lambda *_: far)
+    base = _base(setting)
+    looked = scanned(setting, base.values, EFFECTS, ())
+    assert taken[-1] == (3 if far else 1)
+    # What is left is the model's own either way.
+    own, index = setting.restricted(())
+    left = misfits(own, [base.values[index]])[0] / np.asarray(own.noise)
+    np.testing.assert_array_equal(looked.at.misfit, left)

@@ -30,7 +30,7 @@ from smajax.control.reference import Reference
 from smajax.control.sweep.batched_loops import LoopSetup, closed_loops
 from smajax.control.sweep.grid import loop_rows
 from smajax.core.parameters import set_parameters
-from smajax.model.extended import with_effects
+from smajax.model.extended import extended, with_effects
 from smajax.model.rigs import arm
 from smajax.model.system import System
 
@@ -78,6 +78,19 @@ def test_the_feedforward_alone_holds_the_plant_where_it_is_to_be(
 ) -> None:
     """Up, down on a branch that begins there, and up again inside of the loop: within 2 % of the stroke."""
     assert held(LOADS[name], shares, seconds) == pytest.approx(shares, abs=0.02)
+
+
+def test_surroundings_that_warm_up_are_warm_where_a_position_is_held() -> None:
+    """The wire keeps its temperature with what they do not take: half of the power where they come to half of its excess."""
+    warm = {"warmed_surroundings.share": 0.5, "warmed_surroundings.time_constant": 1.0}
+    warmed = extended(HANGING, ("warmed_surroundings",), warm)
+    plain, other = hysteresis_of(HANGING), hysteresis_of(warmed)
+    own, less = np.asarray(plain.austenite_command), np.asarray(other.austenite_command)
+    within = own < 0.99 * own.max()  # of the drive's limit
+    assert within.sum() > 5
+    assert less[within] ** 2 == pytest.approx(0.5 * own[within] ** 2, rel=1e-3, abs=1e-6)
+    where, ends = [0.3, 0.6], held(warmed, [0.3, 0.6], 30.0)
+    assert ends == pytest.approx(where, abs=0.03)
 
 
 def test_a_branch_that_begins_inside_of_the_loop_begins_at_the_top_of_its_range() -> None:

@@ -27,6 +27,7 @@ from smajax.model.load.coupon import Coupon
 from smajax.model.system import System, heating_power, initial_state
 from smajax.model.types import Scalar, Series, State
 from smajax.model.wire.heat import HeatState, convection, heat_rate, mass_per_metre
+from smajax.model.wire.history import history_at_start
 from smajax.model.wire.resistance import resistance_per_metre
 from smajax.simulation.step import step
 
@@ -123,7 +124,10 @@ def _holding(system: System, temperatures: Series, fraction: Scalar, rest: State
     most = jnp.minimum(FARTHEST * scales_of(system).command, system.drive.largest_command())
 
     def command(temperature: Scalar) -> Scalar:
-        at = HeatState(temperature, air, fraction, 0.0 * one, rest.wire, one)
+        # What follows the wire's temperature has come to it.
+        held = dataclasses.replace(rest.wire, temperature=temperature)
+        held = dataclasses.replace(held, history={**held.history, **history_at_start(terms.history, held)})
+        at = HeatState(temperature, air, fraction, 0.0 * one, held, one)
         lost = -heat_rate(wire, terms.heat, at, 0.0 * one)
         ohms = resistance_per_metre(wire, terms.resistance, temperature, fraction)
 

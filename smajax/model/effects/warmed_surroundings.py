@@ -26,7 +26,7 @@ class WarmedSurroundings(AbstractEffect, HeatTerm, HistoryTerm):
 
     A second thermal mass between wire and air: of what the wire is above the air its surroundings come to the share w, a time constant late.
     With conductances $G_1$ from the wire to them and $G_2$ from them to the air $w = G_1/(G_1 + G_2)$ and $\tau = m c/(G_1 + G_2)$ (heat balance of the
-    second mass). A run begins with surroundings as warm as they would be for long beside the wire as it is.
+    second mass, in air of constant temperature: a change of the air's they follow at once). Effects that change the convection change what the wire loses to the air. A run begins with surroundings as warm as they would be for long beside the wire as it is.
     """
 
     share: Scalar = parameter(
