@@ -12,6 +12,7 @@ from functools import partial
 
 import numpy as np
 
+from smajax.attribution.exclusive_effects import replaceable
 from smajax.attribution.findings import LikelierModel, NoLikelierModel, Reason, Round, StepDependent
 from smajax.attribution.fitted_sets import JointRound, JointSearch
 from smajax.attribution.joint_search import (
@@ -79,7 +80,9 @@ class _Stage:
         doubted = [effect for effect in found.effects if LIBRARY[effect].candidate.prior_class != "material"]
         if not doubted or len(found.effects) >= MANY or self._leaves_noise(found):
             return search, found
-        rest = _Stage(self.setting, self.settings, self.excluded | set(doubted), self.asked)
+        # And without what looks much the same, which has been tried in their place.
+        alike = {name for name in search.joint.coefficients for one in doubted if replaceable(name, one)}
+        rest = _Stage(self.setting, self.settings, self.excluded | alike | set(doubted), self.asked)
         other, instead = rest._from_base(base, search.programs)
         search.fitted = {**other.fitted, **search.fitted}
         error = search.error(search.best(search.error(found)))

@@ -191,6 +191,24 @@ def test_one_effect_that_is_likelier_comes_in_the_place_of_many(monkeypatch: pyt
     assert stage.before_the_end(search, _model(THREE[:2], 5.0, 10.0)) is None
 
 
+def test_the_second_search_is_without_what_looks_like_what_the_first_has_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another friction in the place of the one that was found is no news."""
+    stage, search, _ = _stage_and_search(monkeypatch, [], [])
+    names = ("latent_heat", "coulomb_friction", "pulley_friction", "sensor_backlash", "sensor_gain")
+    search.joint, search.programs = SimpleNamespace(coefficients=names), ()
+    found, other = _model(["coulomb_friction"], 5.0, 10.0), _model((), 9.0, 0.0)
+    search.best = lambda _: found
+    excluded: list[set[str]] = []
+
+    def from_base(self: Any, *_: Any) -> tuple[Any, Any]:
+        excluded.append(set(self.excluded))
+        return search, other if len(excluded) > 1 else found
+
+    monkeypatch.setattr(joint_stage._Stage, "_from_base", from_base)
+    assert stage.searched(np.zeros(3)) == (search, found)
+    assert excluded == [set(), {"coulomb_friction", "pulley_friction", "sensor_backlash"}]
+
+
 def test_with_a_finer_integration_the_search_goes_on_from_the_likeliest_models(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of these the base model begins where that integration has fitted it."""
     fitted = {FEW[:count]: _model(FEW[:count], 9.0 - count, 5.0) for count in range(3)}
