@@ -198,8 +198,6 @@ def linear_model(joint: JointParameters, traces: Traces, variance: float, candid
 def _widen(linear: LinearModel) -> None:
     """Widen the priors of every effect that is off, beside those that are present, by its likeliest factor."""
     present = [one for one in linear.places if one.effect in linear.traces.present]
-    for variant in present:  # their precision has it
-        linear.log_odds[variant] -= 2.0 * float(np.log(linear.joint.width_factors.get(variant.effect, 1.0)))
     shared = linear._columns(frozenset(present))
     matrix = linear.gram[np.ix_(shared, shared)] + np.diag(linear.precision[shared])
     try:

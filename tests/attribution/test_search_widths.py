@@ -96,20 +96,6 @@ def test_fits_of_a_round_begin_with_the_widths_of_the_linear_model(monkeypatch: 
     assert fits[0].values[search.joint.slots[name]] > 2.0 * MOST_START * search.joint.priors[name].sigma
 
 
-def test_the_widths_of_an_effect_cost_the_same_whether_it_is_on_or_off() -> None:
-    search = _with_narrow_priors(hot_weight({"latent_heat.enthalpy": 1.2e4}), 64.0)
-    base = fitted_model(search.joint, (), search.joint.problem.start_values(), ())
-    off = linear_model(search.joint, traces_at(search.joint, base, search.extent), NOISE**2, CANDIDATES)
-    wide = dataclasses.replace(search.joint, width_factors={"latent_heat": 16.0})
-    there = np.array(base.values)
-    there[wide.slots["latent_heat.enthalpy"]] = 7.5e3
-    present = fitted_model(wide, ("latent_heat",), there, ("latent_heat",))
-    on = linear_model(wide, traces_at(wide, present, search.extent), NOISE**2, CANDIDATES)
-    variant = Variant("latent_heat", -1)
-    assert off.width_factors["latent_heat"] == 16.0
-    assert on.log_odds[variant] == pytest.approx(off.log_odds[variant], abs=1e-9)
-
-
 def test_where_unknowns_are_not_told_apart_no_width_is_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
     def not_definite(_: np.ndarray) -> None:
         raise np.linalg.LinAlgError
