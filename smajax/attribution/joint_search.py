@@ -71,7 +71,7 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
             if other is present:
                 break
             if other is not None:
-                ended, present, error = [*ended, present], _noted(search, present, other), search.error(other)
+                ended, present, error = [*ended, present], noted(search, present, other), search.error(other)
         search.joint = dataclasses.replace(search.joint, width_factors=present.width_factors)
         linear, traces = _linear(search, present, error)
         last = present.effects in checked
@@ -114,7 +114,7 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
                 # `traces` are those of the model that the round began with.
                 several = None if moved else _several_at_once(search, present, traces, error, number)
                 other = several or search.before_the_end(present)
-                other = other and _noted(search, present, other)
+                other = other and noted(search, present, other)
             if other is None:
                 break
             ended, shapes = [*ended, present], shapes | {of_groups(other.effects)}
@@ -125,7 +125,7 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
     return present
 
 
-def _noted(search: JointSearch, present: FittedModel, other: FittedModel) -> FittedModel:
+def noted(search: JointSearch, present: FittedModel, other: FittedModel) -> FittedModel:
     """`other`, which is likelier than `present` at the error that it leaves itself, as what a round ended with."""
     error, gain = search.error(other), _gain(search, present, other)
     done = JointRound(error, present.effects, ((other.effects, gain, other.rms),), other.effects, gain)

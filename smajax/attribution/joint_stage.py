@@ -20,6 +20,7 @@ from smajax.attribution.joint_search import (
     fitted_alone,
     fitted_from,
     likeliest_alone,
+    noted,
     search_jointly,
 )
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model
@@ -267,6 +268,7 @@ def _kept_at_half_step(
     setting = stage.setting
     while True:
         search, found = searched()
+        found = with_no_effect_too_many(search, found)
         error = search.error(found)
         base_model = refined(search, search.fitted[()], search.error_of(()))
         first = as_model(search, base_model, error)
@@ -282,6 +284,21 @@ def _kept_at_half_step(
         if (effect,) in search.fitted:
             seen.alone_rmse = search.fitted[(effect,)].rms
     return search, first, final
+
+
+def with_no_effect_too_many(search: JointSearch, found: FittedModel) -> FittedModel:
+    """`found`, or the likeliest model where it is likelier once `found` without each of its effects is at its optimum: in the search such fits may have ended early."""
+    left: set[tuple[str, ...]] = set()
+    while found.effects not in left:
+        left.add(found.effects)
+        error = search.error(found)
+        found = refined(search, found, error)
+        for effect in found.effects:
+            without(search, found, effect, error)
+        best = search.best(error)
+        found = found if best.effects == found.effects else noted(search, found, best)
+    search.winner = found.effects
+    return found
 
 
 def refined(search: JointSearch, model: FittedModel, error: float) -> FittedModel:
@@ -320,7 +337,7 @@ def final_model(search: JointSearch, setting: Search, found: FittedModel, error:
     return as_model(search, fitted_model(search.joint, best.effects, fit.values, best.effects), error)
 
 
-def without(search: JointSearch, model: Model, effect: str, error: float) -> FittedModel:
+def without(search: JointSearch, model: Model | FittedModel, effect: str, error: float) -> FittedModel:
     """`model` without one of its effects, at the optimum."""
     rest = search.joint.ordered([one for one in model.effects if one != effect])
     fitted = search.fitted.get(rest)

@@ -13,6 +13,7 @@ from smajax.attribution.detectable_effects import detectable
 from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.joint_parameters import JointParameters, residual_and_columns
 from smajax.attribution.joint_search import search_jointly
+from smajax.attribution.joint_stage import refined, with_no_effect_too_many
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model
 from smajax.attribution.leave_one_run_out import left_out
 from smajax.attribution.program_fits import models_by_program
@@ -119,6 +120,21 @@ def test_a_search_goes_on_from_what_is_named_before_its_end(monkeypatch: pytest.
     assert [(done.present, done.best) for done in search.rounds if done.best != done.present] == [
         ((), ("latent_heat",))
     ]
+
+
+def test_an_effect_that_is_not_needed_at_the_optimum_without_it_is_not_kept() -> None:
+    """The fit without it had ended early."""
+    search = hot_weight({"latent_heat.enthalpy": 1.2e4})
+    joint, both = search.joint, search.joint.ordered(("latent_heat", "phase_resistance"))
+    base = joint.problem.start_values()
+    early = np.array(base)
+    early[joint.slots["latent_heat.enthalpy"]] = 1.0e4
+    search.fitted = {effects: fitted_model(joint, effects, early, both) for effects in ((), ("latent_heat",), both)}
+    search.fitted[both] = refined(search, search.fitted[both], NOISE)
+    assert search.best(NOISE).effects == both
+    assert with_no_effect_too_many(search, search.fitted[both]).effects == ("latent_heat",)
+    assert search.winner == ("latent_heat",)
+    assert search.rounds[-1].best == ("latent_heat",)
 
 
 def test_a_set_whose_fits_have_no_number_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
