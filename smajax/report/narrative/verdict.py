@@ -40,7 +40,7 @@ VERDICTS = {
 }
 
 
-STAND_INS = 5  # effects that leave more than noise all the same: no bench lacks so many and one more
+STAND_INS = 6  # effects that leave more than noise all the same: as many as a set may have
 MANY_STAND_IN = ("Something is missing that effects of the library only imitate", "poor")
 AT_A_BOUND = ("Explained, but by what ends at a bound", "fair")
 UNKNOWN_AT_A_BOUND = {
