@@ -36,6 +36,7 @@ from smajax.model.effects.prior_width import CoefficientPrior
 
 LIKELIEST = 4  # sets of effects from which the search goes on with the values of presets free
 FREED_SHARE = 2.0 / 3.0  # of the base error, to which free values of presets lower it where the search begins so
+AS_LIKELY = 0.5  # log odds: of two models that are nearer the search's stays
 SETTLED_COST = 1e-4  # of twice the log-likelihood: the optimum to within a hundredth of a standard error
 
 
@@ -296,7 +297,8 @@ def with_no_effect_too_many(search: JointSearch, found: FittedModel) -> FittedMo
         for effect in found.effects:
             without(search, found, effect, error)
         best = search.best(error)
-        found = found if best.effects == found.effects else noted(search, found, best)
+        if best.log_evidence(error**2) - found.log_evidence(error**2) > AS_LIKELY:
+            found = noted(search, found, best)
     search.winner = found.effects
     return found
 
