@@ -94,6 +94,7 @@ def effects_found(
     left = [name for name in job.candidates if name not in final.effects] if scored else []
     last = {score.effects[0]: score for score in scores_at(setting, final, left, looked_for)} if left else {}
     fitted = {parameter.name: parameter for parameter in after.parameters}
+    joint = setting.joint(final.effects)
     findings = []
     for name in job.candidates:
         effect, seen = LIBRARY[name], setting.evidence.get(name, Evidence())
@@ -103,6 +104,7 @@ def effects_found(
                 fitted[full].standard_error,
                 fitted[full].unit,
                 over_runs(final, job.problem.names.index(full), fitted[full].standard_error),
+                joint.priors[full].deviation(fitted[full].value),
             )
             for full in setting.coefficients(name)
             if full in fitted

@@ -100,6 +100,7 @@ class CoefficientFinding:
     standard_error: float | None
     unit: str
     by_runs: tuple[float, float] | None = None  # 95 % by the jackknife over runs
+    widths_off: float | None = None  # from the base value, in widths of the effect's prior; with a sign
 
 
 @dataclass(frozen=True)

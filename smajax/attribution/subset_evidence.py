@@ -29,9 +29,8 @@ from smajax.fit.uncertainty import at_bound
 
 Subset = frozenset[Variant]
 WIDTHS = tuple(2.0**power for power in range(7))  # factors of an effect's widths that are compared
-MOST_EFFECTS = (
-    6  # of a set: more that leave more than noise stand in for something else, and a search among them does not end
-)
+# Of a set: more that leave more than noise stand in for something else, and a search among them does not end.
+MOST_EFFECTS = 6
 IMPOSSIBLE = 6.0  # standard errors on the wrong side of zero
 FREE_OF_BOUNDS = 1e-6  # of the range: nearer to a bound an unknown is held
 

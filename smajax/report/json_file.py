@@ -119,6 +119,7 @@ def _coefficient(result: CoefficientFinding) -> dict[str, Any]:
         "standard_error": result.standard_error,
         "unit": result.unit,
         "interval_over_runs": result.by_runs,
+        **({} if result.widths_off is None else {"widths_of_prior": result.widths_off}),
     }
 
 

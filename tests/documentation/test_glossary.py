@@ -60,6 +60,7 @@ ALLOWED: set[str] = set()
 PLAIN = set(
     [
         "abstract",
+        "widths",
         "actuator",
         "added",
         "after",

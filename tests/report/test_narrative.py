@@ -160,6 +160,17 @@ def test_each_cluster_of_correlated_parameters_has_one_line_with_advice() -> Non
     assert any(one.startswith("damping: determined by its prior") for one in limits)
 
 
+@pytest.mark.parametrize("widths", [4.9, -31.2, None])
+def test_an_effect_far_larger_than_usual_is_said_to_be(widths: float | None) -> None:
+    (one,) = [effect for effect in made_findings().effects if effect.added]
+    coefficients = {name: dataclasses.replace(own, widths_off=widths) for name, own in one.coefficients.items()}
+    found = dataclasses.replace(made_findings(), effects=(dataclasses.replace(one, coefficients=coefficients),))
+    text = " ".join(narrate(found).summary)
+    assert ("latent_heat.enthalpy is 31 times as large as is usual" in text) == (widths == -31.2)
+    (coefficient,) = findings_to_json(found)["effects"][0]["coefficients"].values()
+    assert coefficient.get("widths_of_prior") == widths
+
+
 def test_many_effects_that_leave_more_than_noise_are_said_to_stand_in() -> None:
     (one,) = [effect for effect in made_findings().effects if effect.added]
     few, many = (

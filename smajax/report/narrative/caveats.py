@@ -27,6 +27,7 @@ from smajax.report.narrative.values import assumed_text, error_text, far_text, v
 NAMED_SIZES = 4  # in a sentence
 UNLIKE = 2.0  # by which the noises that outputs leave differ and are more than noise
 NORMAL_95 = 1.96
+UNUSUAL = 5.0  # widths of its prior that an effect is off
 EVEN = 0.5  # of a probability: as likely as not
 
 
@@ -222,6 +223,21 @@ def of_the_preset(findings: Findings, effect: EffectFinding) -> str:
         "Give thermal_modulus in [model.parameters] ('0 MPa/K' where the wire shows none) and run again: in rate form it also leaves a strain "
         "with every cycle, and other effects that are named here may make up for that."
     )
+
+
+def of_an_unusual_size(effect: EffectFinding) -> list[str]:
+    """An effect far larger than its prior has it: found where the runs ask for it, and as often as not in the place of another."""
+    candidate = LIBRARY[effect.name].candidate
+    switches = () if candidate.keeps_priors else candidate.switches  # `of_priors_left` has those
+    found = {name: effect.coefficients[name] for name in switches if name in effect.coefficients}
+    far = {name: one for name, one in found.items() if one.widths_off is not None and abs(one.widths_off) >= UNUSUAL}
+    if not far:
+        return []
+    sizes = [
+        f"{effect.name}.{name} is {abs(one.widths_off or 0.0):.0f} times as large as is usual"
+        for name, one in far.items()
+    ]
+    return [f"Mind: {and_listed(sizes)}. Measure it if you can: an effect of that size may stand in for another."]
 
 
 def of_a_size(findings: Findings, effect: EffectFinding) -> list[str]:

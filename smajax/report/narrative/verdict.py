@@ -99,6 +99,7 @@ def summary(findings: Findings) -> tuple[str, ...]:
             *sign_sentences(effect.name, fitted),
             *curve_sentences(effect.name, values),
             *caveats.of_a_size(findings, effect),
+            *caveats.of_an_unusual_size(effect),
         ]
     sentences += caveats.held_out_warnings(findings)
     sentences += caveats.of_a_faint_trace(findings)
