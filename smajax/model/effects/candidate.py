@@ -52,6 +52,15 @@ def several_forces(extent: Extent) -> bool:
     return not extent.one_force
 
 
+def time_constants(*shares: float) -> Callable[[Extent], tuple[dict[str, float], ...]]:
+    """A grid of `time_constant`, in shares of a run's length."""
+
+    def grid(extent: Extent) -> tuple[dict[str, float], ...]:
+        return tuple({"time_constant": share * extent.seconds} for share in shares)
+
+    return grid
+
+
 class Width(NamedTuple):
     """How far a coefficient lies from its base value, over the wires and benches that have the effect.
 

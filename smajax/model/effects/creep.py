@@ -8,17 +8,13 @@ import jax.numpy as jnp
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate, Extent, Width
+from smajax.model.effects.candidate import Candidate, Width, time_constants
 from smajax.model.types import Scalar, WireState
 from smajax.model.wire.constitutive import ConstitutiveTerm
 from smajax.model.wire.history import DURATION, HistoryTerm, following
 from smajax.model.wire.wire import Wire
 
 RETARDED = "retarded_strain"
-
-
-def _grid(extent: Extent) -> tuple[dict[str, float], ...]:
-    return tuple({"time_constant": share * extent.seconds} for share in (0.01, 0.05, 0.2))
 
 
 class Creep(AbstractEffect, HistoryTerm, ConstitutiveTerm):
@@ -44,7 +40,7 @@ class Creep(AbstractEffect, HistoryTerm, ConstitutiveTerm):
         switches=("austenite", "martensite"),
         initial_guess={"austenite": 5e-12, "martensite": 5e-12, "time_constant": 5.0},
         needs_time=True,
-        grid=_grid,
+        grid=time_constants(0.01, 0.05, 0.2),
         prior_class="bench",
         widths={
             "austenite": Width(

@@ -10,15 +10,11 @@ from smajax.core.parameters import parameter
 from smajax.model.drive.base import AbstractDrive
 from smajax.model.drive.supply import NO_VOLTAGE, Circuit, SupplyTerm
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Actuator, Candidate, Extent, Width
+from smajax.model.effects.candidate import Actuator, Candidate, Width, time_constants
 from smajax.model.types import Scalar, WireState
 from smajax.model.wire.history import DURATION, HistoryTerm, forgotten
 
 REMEMBERED = "supply_current"
-
-
-def _grid(extent: Extent) -> tuple[dict[str, float], ...]:
-    return tuple({"time_constant": share * extent.seconds} for share in (0.02, 0.1, 0.4))
 
 
 def _applies(system: Actuator) -> bool:
@@ -45,7 +41,7 @@ class SupplyMemory(AbstractEffect, HistoryTerm, SupplyTerm):
         switches=("resistance",),
         initial_guess={"resistance": 0.1, "time_constant": 2.0},
         needs_time=True,
-        grid=_grid,
+        grid=time_constants(0.02, 0.1, 0.4),
         applies=_applies,
         prior_class="bench",
         widths={

@@ -8,17 +8,13 @@ import jax.numpy as jnp
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate, Extent, Width
+from smajax.model.effects.candidate import Candidate, Width, time_constants
 from smajax.model.types import Scalar, WireState
 from smajax.model.wire.heat import HeatState, HeatTerm, convection
 from smajax.model.wire.history import DURATION, HistoryTerm, following
 from smajax.model.wire.wire import Wire
 
 LATE = "late_temperature"  # C, of the wire, as its surroundings have it
-
-
-def _grid(extent: Extent) -> tuple[dict[str, float], ...]:
-    return tuple({"time_constant": share * extent.seconds} for share in (0.02, 0.1, 0.4))
 
 
 class WarmedSurroundings(AbstractEffect, HeatTerm, HistoryTerm):
@@ -44,7 +40,7 @@ class WarmedSurroundings(AbstractEffect, HeatTerm, HistoryTerm):
         switches=("share",),
         initial_guess={"share": 0.1, "time_constant": 10.0},
         needs_time=True,
-        grid=_grid,
+        grid=time_constants(0.02, 0.1, 0.4),
         prior_class="bench",
         widths={
             "share": Width(0.2, "air of a box to a close sleeve: 0.05 to 0.5"),

@@ -229,14 +229,14 @@ def of_an_unusual_size(effect: EffectFinding) -> list[str]:
     """An effect far larger than its prior has it: found where the runs ask for it, and as often as not in the place of another."""
     candidate = LIBRARY[effect.name].candidate
     switches = () if candidate.keeps_priors else candidate.switches  # `of_priors_left` has those
-    found = {name: effect.coefficients[name] for name in switches if name in effect.coefficients}
-    far = {name: one for name, one in found.items() if one.widths_off is not None and abs(one.widths_off) >= UNUSUAL}
-    if not far:
-        return []
+    off = {name: abs(one.widths_off or 0.0) for name, one in effect.coefficients.items() if name in switches}
     sizes = [
-        f"{effect.name}.{name} is {abs(one.widths_off or 0.0):.0f} times as large as is usual"
-        for name, one in far.items()
+        f"{effect.name}.{name} is {widths:.0f} times as large as is usual"
+        for name, widths in off.items()
+        if widths >= UNUSUAL
     ]
+    if not sizes:
+        return []
     return [f"Mind: {and_listed(sizes)}. Measure it if you can: an effect of that size may stand in for another."]
 
 
