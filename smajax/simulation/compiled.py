@@ -35,6 +35,7 @@ from smajax.simulation.simulate import (
     first_state,
     simulate,
     trajectory_of,
+    warn_of_unsolved,
 )
 from smajax.simulation.steppers import Integration, stepper_of
 
@@ -81,9 +82,10 @@ def simulate_compiled(
     check_scalars(system, dt, initial)
     check_bounds(system)
     check_tolerance(system, tolerance)
-    return compiled_run(
-        system, inputs, dt, Integration(None if tolerance is None else jnp.asarray(tolerance)), initial, engine
-    )
+    integration = Integration(None if tolerance is None else jnp.asarray(tolerance))
+    run = compiled_run(system, inputs, dt, integration, initial, engine)
+    warn_of_unsolved(run)
+    return run
 
 
 def check_tolerance(system: System, tolerance: Tolerance) -> None:

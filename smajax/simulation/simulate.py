@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from typing import Any
 
@@ -22,6 +23,10 @@ from smajax.simulation.steppers import ONE_STEP, Integration, Stepper, stepper_o
 # Keeps the arm within 0.05 degrees and the fraction within 1e-3 of the exact solution on the source's rigs, open and
 # closed loop (studies/convergence.py shows error against step).
 DEFAULT_STEP = 0.005  # s
+
+
+class UnsolvedWarning(UserWarning):
+    """Steps of a run did not converge: it may be wrong from the first of them on."""
 
 
 def check_kinds(system: Any, inputs: Any) -> None:
@@ -136,8 +141,8 @@ def simulate(
     """Simulate over the samples of `inputs`, each of shape (n,), SI, `dt` seconds apart.
 
     The result holds the states at t_0 ... t_{n-1}; input i is held from t_i to t_{i+1} (a coupon's inputs are values
-    at t_i). `unsolved` counts the stages until then whose solver did not converge: 0, or take a shorter step. `initial` defaults to rest
-    with the first inputs. Raises ValueError for missing or ill-shaped inputs, for one
+    at t_i). `unsolved` counts the stages until then whose solver did not converge: 0, or take a shorter step (an
+    `UnsolvedWarning` says so of a run that is not traced). `initial` defaults to rest with the first inputs. Raises ValueError for missing or ill-shaped inputs, for one
     that is not finite and a parameter out of its bounds, unless the value is not known yet (`jit`, `vmap`, `grad`).
     `integration`: how finely between two samples, by default one step, for what is traced cannot look at its own error:
     `compiled.chosen_integration` looks before. Error-controlled steps have derivatives in forward mode alone.
@@ -146,7 +151,21 @@ def simulate(
     check_scalars(system, dt, initial)
     check_bounds(system)
     series = acting_inputs(system, {name: jnp.asarray(values, dtype=float) for name, values in inputs.items()}, dt)
-    return trajectory_of(stepper_of(system, dt, integration), series, first_state(system, series, initial))
+    run = trajectory_of(stepper_of(system, dt, integration), series, first_state(system, series, initial))
+    warn_of_unsolved(run)
+    return run
+
+
+def warn_of_unsolved(run: Trajectory) -> None:
+    """An `UnsolvedWarning` to whoever called the caller, where a stage of `run` did not converge; none within `jit`, `vmap`, `grad`."""
+    if isinstance(run.unsolved, jax.core.Tracer) or not (count := int(run.unsolved[-1])):
+        return
+    first = float(run.time[int(np.argmax(np.asarray(run.unsolved) > 0))])
+    text = (
+        f"{count} of {len(run.time) - 1} steps did not converge, the first of them before {first:.6g} s: the run may be wrong from there on. "
+        "Take a shorter `dt`, or several steps between two samples (`simulate_compiled(..., tolerance=1e-4)`)."
+    )
+    warnings.warn(text, UnsolvedWarning, stacklevel=3)
 
 
 def held_inputs(system: System, series: Mapping[str, Series]) -> dict[str, Series]:

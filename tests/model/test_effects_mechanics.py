@@ -76,6 +76,8 @@ def test_stribeck_friction_falls_from_its_value_at_rest_to_that_in_motion() -> N
     np.testing.assert_allclose(alike, run("coulomb_friction", limit=rest).position, rtol=0.0, atol=1e-12)
 
 
+# At the long steps a few do not converge. What they leave in the position is what this is about.
+@pytest.mark.filterwarnings("ignore:.*did not converge:smajax.simulation.simulate.UnsolvedWarning")
 @pytest.mark.parametrize(("speed", "bend"), [(2e-4, 2e-5), (5e-4, 2e-5), (1e-3, 2e-5), (5e-4, 1e-4)])
 def test_a_sliding_load_keeps_sliding_at_any_step(speed: float, bend: float) -> None:
     """Friction that falls with the speed: at a long step the same readings as at short ones, to a hundredth of the stroke."""

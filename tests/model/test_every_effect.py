@@ -179,7 +179,7 @@ def test_every_effect_at_its_initial_guess_changes_the_reading(effect: str) -> N
     assert np.abs(told.at_starts - told.at_base).max() > 1e-4 * np.ptp(told.at_base)
 
 
-# Their derivative is that at fixed steps of a staircase (see the effect); a difference sees samples change their step.
+# Their derivative is that of a staircase with round edges (see the effect); a difference sees samples change their step.
 STAIRS = {"sensor_resolution.increment", "sensor_resolution.zero"}
 
 

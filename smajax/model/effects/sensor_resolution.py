@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+import jax
 import jax.numpy as jnp
 
 from smajax.core.parameters import parameter
@@ -28,8 +29,8 @@ def _grid(extent: Extent) -> tuple[dict[str, float], ...]:
 class SensorResolution(AbstractEffect, SensorTerm):
     r"""$y = (1 - s)\,x + s\,\{z + q\,\mathrm{round}[(x - z)/q]\}$; a share s of one is the staircase itself.
 
-    By the increment q and the zero z the derivative is that at fixed steps of the stair: of each level, not of which
-    sample is on which.
+    The derivatives are those of the stair with round edges, z + q {u - sin(2 pi u)/(2 pi)}, u = (x - z)/q: the stair's own
+    are zero wherever it is flat, and would tell a fit nothing of when the motion goes from one level to the next.
     """
 
     share: Scalar = parameter("-", 0.0, 1.0, "s: share of the staircase in the reading", default=0.0)
@@ -57,5 +58,8 @@ class SensorResolution(AbstractEffect, SensorTerm):
     )
 
     def sensed(self, reading: Scalar, time: Scalar, last: Scalar) -> Scalar:
-        steps = jnp.floor((reading - self.zero) / self.increment + 0.5)
-        return reading + self.share * (self.zero + self.increment * steps - reading)
+        steps = (reading - self.zero) / self.increment
+        stair = self.zero + self.increment * jnp.floor(steps + 0.5)
+        smooth = self.zero + self.increment * (steps - jnp.sin(2.0 * jnp.pi * steps) / (2.0 * jnp.pi))
+        stair = jax.lax.stop_gradient(stair - smooth) + smooth
+        return reading + self.share * (stair - reading)

@@ -1,0 +1,45 @@
+"""A staircase, and derivatives by which a fit can move."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from smajax.model.effects.sensor_resolution import SensorResolution
+
+INCREMENT, ZERO = 2e-3, 3e-4
+ONE_CELL = ZERO + INCREMENT * (np.arange(-100, 100) + 0.5) / 200
+
+
+def _shown(x: jax.Array, zero: float = ZERO, share: float = 1.0) -> jax.Array:
+    return SensorResolution(share=share, increment=INCREMENT, zero=zero).sensed(x, 0.0, 0.0)
+
+
+def test_it_shows_levels_alone() -> None:
+    x = np.linspace(-0.01, 0.01, 5001)
+    shown = np.asarray(_shown(x))
+    np.testing.assert_allclose(shown, ZERO + INCREMENT * np.floor((x - ZERO) / INCREMENT + 0.5), rtol=0.0, atol=1e-16)
+    np.testing.assert_allclose(_shown(x, share=0.25), x + 0.25 * (shown - x), rtol=0.0, atol=1e-16)
+
+
+def test_over_a_level_its_derivatives_are_those_of_the_mean() -> None:
+    """A motion by one increment goes up one level; a zero that moves by one increment gives the same levels again."""
+    by_x = np.asarray(jax.vmap(jax.grad(_shown))(ONE_CELL))
+    by_zero = np.asarray(jax.vmap(jax.grad(_shown, argnums=1), in_axes=(0, None))(ONE_CELL, ZERO))
+    assert by_x.mean() == pytest.approx(1.0, abs=1e-9) and by_zero.mean() == pytest.approx(0.0, abs=1e-9)
+    # In the middle of a level the reading moves with the zero, at its edge with the motion.
+    assert by_zero[99:101].min() > 0.99 and by_x[99:101].max() < 0.01 and by_x[0] > 1.99
+
+
+@pytest.mark.parametrize("start", [0.93, 1.06])
+def test_a_fit_finds_the_motion_behind_the_levels(start: float) -> None:
+    """The scale of a motion of ten levels: with the stair's own derivatives, zero, it stays where it begins."""
+    motion = 0.02 * np.sin(np.linspace(0.0, 3.0, 2000))
+    measured = _shown(jnp.asarray(1.01 * motion))
+    scale = start
+    for _ in range(20):
+        shown, slope = jax.jvp(lambda one: _shown(one * motion), (scale,), (1.0,))
+        scale += float(slope @ (measured - shown) / (slope @ slope))
+    assert scale == pytest.approx(1.01, abs=2e-3)
