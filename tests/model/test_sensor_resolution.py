@@ -28,9 +28,12 @@ def test_over_a_level_its_derivatives_are_those_of_the_mean() -> None:
     """A motion by one increment goes up one level; a zero that moves by one increment gives the same levels again."""
     by_x = np.asarray(jax.vmap(jax.grad(_shown))(ONE_CELL))
     by_zero = np.asarray(jax.vmap(jax.grad(_shown, argnums=1), in_axes=(0, None))(ONE_CELL, ZERO))
-    assert by_x.mean() == pytest.approx(1.0, abs=1e-9) and by_zero.mean() == pytest.approx(0.0, abs=1e-9)
+    assert by_x.mean() == pytest.approx(1.0, abs=1e-9)
+    assert by_zero.mean() == pytest.approx(0.0, abs=1e-9)
     # In the middle of a level the reading moves with the zero, at its edge with the motion.
-    assert by_zero[99:101].min() > 0.99 and by_x[99:101].max() < 0.01 and by_x[0] > 1.99
+    assert by_zero[99:101].min() > 0.99
+    assert by_x[99:101].max() < 0.01
+    assert by_x[0] > 1.99
 
 
 @pytest.mark.parametrize("start", [0.93, 1.06])
