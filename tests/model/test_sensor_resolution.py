@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -13,8 +15,8 @@ INCREMENT, ZERO = 2e-3, 3e-4
 ONE_CELL = ZERO + INCREMENT * (np.arange(-100, 100) + 0.5) / 200
 
 
-def _shown(x: jax.Array, zero: float = ZERO, share: float = 1.0) -> jax.Array:
-    return SensorResolution(share=share, increment=INCREMENT, zero=zero).sensed(x, 0.0, 0.0)
+def _shown(x: Any, zero: float = ZERO, share: float = 1.0) -> Any:
+    return SensorResolution(share=share, increment=INCREMENT, zero=zero).sensed(x, jnp.zeros(()), x)
 
 
 def test_it_shows_levels_alone() -> None:
