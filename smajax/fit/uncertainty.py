@@ -15,8 +15,11 @@ from smajax.core.old_words import worded
 from smajax.core.whiteness import WHITE, bartlett_sum, correlation_time, split_runs, whiteness_p_value
 from smajax.fit.sensitivity import Sensitivity
 
-# A fitted value nearer to a bound than this share of the range counts as at the bound.
+# A fitted value nearer to a bound than this share of the range counts as at the bound, unless it is farther from it than so many
+# standard errors, all else held: bounds of a friction go to 20 N m, and an arm's may be a thousandth of that.
 AT_BOUND = 2e-3
+CLEAR_OF_BOUND = 5.0
+ENDED = 1e-6  # of the range: a fit that ends so near to a bound was stopped by it
 ORDERS_APART = 100.0  # bounds, one over the other, of a parameter whose size is what is unknown
 # Two parameters whose estimates are correlated more than this: the runs determine one combination of them.
 CORRELATED = 0.98
@@ -81,6 +84,16 @@ def at_bound(value: float, low: float, high: float, edge: float = AT_BOUND) -> R
     if value - low < span:
         return Remark(RemarkKind.LOWER_BOUND)
     return Remark(RemarkKind.UPPER_BOUND) if high - value < span else Remark()
+
+
+def _clear_of_bound(
+    at: Sensitivity, name: str, value: float, bounds: tuple[float, float], variance: float | None
+) -> bool:
+    """Whether the runs would tell `name` at the nearer of its bounds from where it is, with all else held."""
+    own, priors = at.columns([name]), at.prior_columns([name])
+    covariance, scale = _covariance(own, priors, split_runs(at.misfit, at.mask), variance)
+    distance = min(value - bounds[0], bounds[1] - value) * scale[0]
+    return bool(distance > CLEAR_OF_BOUND * math.sqrt(max(covariance[0, 0], 0.0)) > 0.0)
 
 
 def _covariance(
@@ -163,6 +176,9 @@ def uncertainty(
     `variance` of a sample, over the noise's, in the place of the residual's; `edge`: share of the range that is at a bound.
     """
     remark = {name: at_bound(values[name], *bounds[name], edge) for name in names}
+    for name in [name for name in names if remark[name] and not at_bound(values[name], *bounds[name], ENDED)]:
+        if _clear_of_bound(at, name, values[name], bounds[name], variance):
+            remark[name] = Remark()
     free = [name for name in names if not remark[name]]
     errors: dict[str, float | None] = dict.fromkeys(names)
     if not free:

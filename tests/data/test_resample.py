@@ -64,9 +64,26 @@ def test_a_tone_above_the_clocks_nyquist_frequency_is_attenuated_and_a_slow_one_
     clock = uniform_clock(0.0, 10.0, STEP)
     fast = resample_output(time, np.sin(2 * np.pi * 19.0 * time), clock, STEP).values
     slow = resample_output(time, np.sin(2 * np.pi * 0.5 * time), clock, STEP).values
-    # The window mean passes sin(pi f dt)/(pi f dt): 0.05 at 19 Hz, which sampling alone would show in full as 1 Hz.
-    assert np.max(np.abs(fast[1:-1])) < 0.06
-    np.testing.assert_allclose(slow, np.sin(2 * np.pi * 0.5 * clock), atol=1.1e-3)
+    # Means over one step and over two pass 4/3 sinc(f dt) - 1/3 sinc(2 f dt), sinc(x) = sin(pi x)/(pi x): 0.087 at 19 Hz, which
+    # sampling alone would show in full as 1 Hz.
+    assert np.max(np.abs(fast[2:-2])) == pytest.approx(4 / 3 * np.sinc(0.95) - np.sinc(1.9) / 3, abs=1e-3)
+    # A mean over one step alone takes 1.0e-3 of it away.
+    np.testing.assert_allclose(slow, np.sin(2 * np.pi * 0.5 * clock), atol=5e-6)
+
+
+@pytest.mark.parametrize("samples", [2, 3, 5, 20, 1.5, 2.5, 7.3])
+def test_a_curvature_of_the_output_stays(samples: float) -> None:
+    """Of whole numbers of samples to rounding; else to a fraction of what a mean over a step takes away, on average to little of it."""
+    interval = STEP / samples
+    time = interval * np.arange(2000, dtype=np.float64)
+    clock = uniform_clock(0.0, time[-1], STEP)
+    result = resample_output(time, 40.0 * (time - 3.0) ** 2, clock, STEP)
+    error = (result.values - 40.0 * (clock - 3.0) ** 2)[2:-2]
+    plain = 80.0 * STEP**2 / 24.0
+    whole = float(samples).is_integer()
+    rounding = 1e-12 * np.abs(result.values).max()
+    assert np.abs(error).max() < (rounding if whole else 0.7 * plain)
+    assert abs(error.mean()) < 0.05 * plain
 
 
 @pytest.mark.parametrize("samples", [2, 5, 20, 50])
@@ -77,8 +94,8 @@ def test_the_noise_gain_is_the_one_that_white_noise_shows(samples: int) -> None:
     clock = uniform_clock(0.0, time[-1], STEP)
     result = resample_output(time, noise, clock, STEP)
     assert np.std(result.values) == pytest.approx(result.noise_gain, rel=0.04)
-    assert result.noise_gain == pytest.approx(1.0 / np.sqrt(samples), rel=0.15)
-    assert window_noise_gain(1e4) == pytest.approx(0.01, rel=1e-3)
+    assert result.noise_gain == pytest.approx(1.18 / np.sqrt(samples), rel=0.15)
+    assert window_noise_gain(1e4) == pytest.approx(0.01 * np.sqrt(25.0 / 18.0), rel=1e-3)
 
 
 def test_nothing_is_averaged_when_the_sensor_is_not_faster_than_the_clock() -> None:

@@ -81,6 +81,23 @@ def test_a_parameter_on_its_bound_has_no_standard_error() -> None:
     assert found.remarks["a"].kind is RemarkKind.UPPER_BOUND
 
 
+@pytest.mark.parametrize(
+    ("size", "kind"), [(2.5e-3, RemarkKind.NONE), (2e-5, RemarkKind.LOWER_BOUND), (0.0, RemarkKind.LOWER_BOUND)]
+)
+def test_a_small_size_that_the_runs_tell_from_zero_is_not_at_its_bound(size: float, kind: RemarkKind) -> None:
+    """A friction of 0.0025 N m within 0 to 20: a thousandth of the range, and a hundred standard errors from zero."""
+    random = np.random.default_rng(3)
+    columns = np.stack([random.normal(size=1600) * 1e3, np.ones(1600)], axis=1)  # errors of 2.5e-5 and 0.025
+    found = uncertainty(
+        _sensitivity(columns, random.normal(size=1600)),
+        ("a", "b"),
+        {"a": size, "b": 3.0},
+        {"a": (0.0, 20.0), "b": (-9.0, 9.0)},
+    )
+    assert found.remarks["a"].kind is kind
+    assert (found.standard_error["a"] is None) == (kind is RemarkKind.LOWER_BOUND)
+
+
 def _estimates_with(covariance: np.ndarray, seed: int, samples: int = 4000) -> Sensitivity:
     """Runs in which the estimates of a, b, c, ... have this covariance, with white noise of one left."""
     rng = np.random.default_rng(seed)
