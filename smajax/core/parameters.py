@@ -95,9 +95,11 @@ def get_parameters(model: eqx.Module, names: Sequence[str]) -> Float[Array, " na
 
 
 def parameter_values(model: eqx.Module) -> dict[str, float]:
-    """Every parameter's value by name, SI."""
+    """Every parameter's value by name, SI; also of a model of known values inside a function that JAX traces."""
     names = list(parameters(model))
-    return dict(zip(names, np.asarray(get_parameters(model, names), dtype=float).tolist(), strict=True))
+    with jax.ensure_compile_time_eval():
+        values = get_parameters(model, names)
+    return dict(zip(names, np.asarray(values, dtype=float).tolist(), strict=True))
 
 
 def set_parameters(model: Module, values: Mapping[str, Any]) -> Module:

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
+from typing import Any
 
+import jax
+import jax.numpy as jnp
+import numpy as np
 import pytest
 
-from smajax.core.parameters import parameter_values
+from smajax.core.parameters import parameter_values, set_parameters
 from smajax.data.model_file.of_presets import model_of_presets
 from smajax.data.model_file.read import load_model
 from smajax.model.presets import build
@@ -54,6 +58,34 @@ def test_values_are_in_units_of_a_data_sheet_and_read_again_to_the_last_bit(tmp_
     same(model, load_model(path))
     (enthalpy,) = [one for one in text.splitlines() if one.startswith('"latent_heat.enthalpy"')]
     assert enthalpy.count(" J/g") == 4, enthalpy  # its error and bounds too
+
+
+@pytest.mark.parametrize(
+    "traced",
+    [
+        jax.jit,
+        jax.grad,
+        lambda function: lambda mass: jax.vmap(function)(mass[None]),
+        lambda function: lambda mass: jax.jit(jax.vmap(jax.grad(function)))(mass[None]),
+    ],
+)
+def test_a_system_first_asked_for_inside_a_traced_function_is_of_numbers(traced: Any) -> None:
+    kept, fresh = fitted_model(), fitted_model()
+    seen: list[Any] = []
+
+    def force(mass: jax.Array) -> jax.Array:
+        system = set_parameters(kept.system, {"load_mass": mass})
+        seen[:] = [parameter_values(kept.system), kept.plants(3)]
+        return jnp.sum(system.load.resistance(mass, mass, {}))
+
+    assert np.isfinite(traced(force)(jnp.array(0.1))).all()
+    assert seen[0] == parameter_values(fresh.system)
+    assert kept.table == fresh.table
+    for mine, theirs in zip(jax.tree.leaves(kept.system), jax.tree.leaves(fresh.system), strict=True):
+        assert not isinstance(mine, jax.core.Tracer)
+        assert mine == theirs
+    # What is not kept may be of tracers; it is there.
+    assert jax.tree.structure(seen[1]) == jax.tree.structure(fresh.plants(3))
 
 
 def test_presets_are_such_a_file_and_build_the_same_system(tmp_path: Path) -> None:

@@ -139,8 +139,13 @@ class ModelRecord:
 
     @cached_property
     def system(self) -> System:
-        """The model with its values, ready to be simulated."""
-        return self.system_of(self.effects, self.values)
+        """The model with its values, ready to be simulated.
+
+        Arrays of numbers, also where it is first asked for inside a function that JAX traces (`jit`, `vmap`, `grad`): a tracer that
+        is kept would be of no use outside of that function.
+        """
+        with jax.ensure_compile_time_eval():
+            return self.system_of(self.effects, self.values)
 
     def system_of(self, effects: Sequence[str], values: Mapping[str, float], carried: Sequence[str] = ()) -> System:
         """The same wire, load and drive with `effects`, at this model's values and then at `values`, SI.
@@ -194,7 +199,8 @@ class ModelRecord:
         random = np.random.default_rng(seed)
         likely, weights = self.weighted
         chosen = random.choice(len(likely), size=count, p=weights)
-        base = self.system_of((), {}, self.every_effect)
+        with jax.ensure_compile_time_eval():  # numbers also inside a function that JAX traces
+            base = self.system_of((), {}, self.every_effect)
         columns = {name: np.full(count, value) for name, value in parameter_values(base).items()}
         for number, model in enumerate(likely):
             own = chosen == number
