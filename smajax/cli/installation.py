@@ -106,7 +106,7 @@ def examine(engine: bool = True) -> dict[str, Any]:
     faults = _plugin_faults()
     return {
         "smajax": {"version": _version(PACKAGE), "folder": str(Path(__file__).parents[1])},
-        "machine": machine(),
+        "machine": {**machine(), "cores of the machine": os.cpu_count()},
         "packages": {name: _version(name) for name, extra in _requirements().items() if not extra},
         "packages of extras": {name: _version(name) for name, extra in _requirements().items() if extra},
         "devices": [f"{one.platform}: {one.device_kind}" for one in jax.devices()],

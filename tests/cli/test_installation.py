@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 from smajax.cli import installation as doctor
 from smajax.cli.benchmark import benchmark
 from smajax.cli.commands.bench import as_lines
+from smajax.cli.commands.doctor import lines_of
 from smajax.cli.main import app
 
 run = CliRunner()
@@ -32,6 +33,16 @@ def test_the_doctor_finds_what_is_missing() -> None:
     assert "optax is not installed" in told
     assert "jax_enable_x64" in told
     assert "JAX_COMPILATION_CACHE_DIR" in told
+
+
+@pytest.mark.parametrize(
+    ("usable", "said"),
+    [(1, "1 core that this process may use, of 8"), (8, "8 cores"), (3, "3 cores that this process may use, of 8")],
+)
+def test_the_doctor_says_which_cores_it_counts(monkeypatch: pytest.MonkeyPatch, usable: int, said: str) -> None:
+    monkeypatch.setattr("smajax.core.machine.available_cores", lambda: usable)
+    monkeypatch.setattr("os.cpu_count", lambda: 8)
+    assert lines_of(doctor.examine(engine=False))[1].endswith(f", {said}")
 
 
 def test_the_doctor_does_not_ask_for_developers_packages(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -49,12 +49,14 @@ def bench(
 
 def as_lines(result: dict[str, Any]) -> list[str]:
     """The result for a terminal."""
+    from smajax.core.wording import counted
+
     here = result["machine"]
     return [
-        f"{here['processor']}, {here['cores']} cores, {here['system']}, load {here['load at the start']}; "
+        f"{here['processor']}, {counted(here['cores'], 'core')}, {here['system']}, load {here['load at the start']}; "
         f"smajax {here['versions']['smajax']}, jax {here['versions']['jax']}, scipy {here['versions']['scipy']}",
         f"smajax:      {result['smajax_ms']:.4f} ms a trajectory ({result['trajectories']['smajax']:,} of "
-        f"{result['trajectories']['seconds']:g} s, {result['smajax_cores']} cores; first call {result['smajax_first_call_s']:.1f} s)",
+        f"{result['trajectories']['seconds']:g} s, {counted(result['smajax_cores'], 'core')}; first call {result['smajax_first_call_s']:.1f} s)",
         f"scipy LSODA: {result['scipy_ms']:.2f} ms a trajectory ({result['trajectories']['scipy']} of them, one core)",
         f"smajax is {result['ratio']:.0f} times as fast, {result['ratio_per_core']:.0f} times a core; the angles differ by "
         f"{result['largest_difference_degrees']:.3f} degrees at most.",

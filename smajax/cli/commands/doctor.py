@@ -60,7 +60,7 @@ def lines_of(result: dict[str, object]) -> list[str]:
 
     return [
         f"smajax {one['smajax']['version']} in {one['smajax']['folder']}",
-        f"python {here['python']}, {here['system']}, {here['processor']}, {here['cores']} cores",
+        f"python {here['python']}, {here['system']}, {here['processor']}, {_cores(here)}",
         f"devices: {', '.join(one['devices'])}",
         f"float64: {'on' if one['float64'] else 'off'} in the commands; a program of your own switches it on itself, before its "
         "first array: smajax.prepare(), or jax.config.update('jax_enable_x64', True)",
@@ -71,6 +71,15 @@ def lines_of(result: dict[str, object]) -> list[str]:
         f"of extras: {versions(one['packages of extras'])}",
         f"plug-ins: {', '.join(one['plug-ins']) or 'none'}",
     ]
+
+
+def _cores(machine: dict[str, Any]) -> str:
+    """`2 cores`; `1 core that this process may use, of 2` where it is bound to some of them."""
+    from smajax.core.wording import counted
+
+    usable, whole = machine["cores"], machine["cores of the machine"]
+    text = counted(usable, "core")
+    return text if whole in (None, usable) else f"{text} that this process may use, of {whole}"
 
 
 def _engine(result: dict[str, Any]) -> str:
