@@ -14,11 +14,14 @@ import pytest
 
 import smajax
 from smajax import __version__
+from smajax.core.parameters import parameters
 from smajax.model.effects.library import LIBRARY, of_others
+from smajax.model.presets import LOADS
 from tests.helpers.often import often
 
 ROOT = Path(__file__).parents[2]
-PAGES = [*sorted((ROOT / "docs" / "how-to").glob("*.md")), ROOT / "CONTRIBUTING.md"]
+LOADS_PAGE = ROOT / "docs" / "reference" / "loads-and-drives.md"
+PAGES = [*sorted((ROOT / "docs" / "how-to").glob("*.md")), LOADS_PAGE, ROOT / "CONTRIBUTING.md"]
 FENCE = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```\n(?:\n^```text\n(.*?)^```\n)?', re.MULTILINE | re.DOTALL)
 SLOW = "found = identify("  # blocks of the slow tests only
 LONG = ("control-your-bench", "on-a-gpu")  # pages that take seconds: in the slow tests
@@ -65,6 +68,16 @@ def test_the_code_of_a_page_runs_and_prints_the_output_shown(
 def test_a_page_with_a_fit_runs_to_its_end(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     run(page, tmp_path)
+
+
+def test_the_page_of_the_loads_has_the_equation_and_the_parameters_of_each() -> None:
+    text = LOADS_PAGE.read_text(encoding="utf-8")
+    own = {"arm", "dead_weight", "bias_spring", "blocked_wire", "coupon", "strain_coupon"}
+    assert own <= set(LOADS)
+    for name in own:
+        assert f"| `{name}`" in text
+        for parameter in parameters(LOADS[name]()):
+            assert f"`{parameter}`" in text, (name, parameter)
 
 
 def test_the_first_example_of_the_readme_prints_the_output_shown(tmp_path: Path) -> None:

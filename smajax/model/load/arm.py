@@ -16,9 +16,14 @@ class Arm(AbstractMovingLoad):
 
     The source omits the geometry: here the payload sits at the end of a link of length L whose own mass is uniform,
     the angle counts from the horizontal, and the spring pulls on a lever. Angles in rad.
+
+    $I_e = \kappa (m_p + m_a/3) L^2$, $\tau_g = (m_p + m_a/2) g L \cos\theta$, $\tau_s = k a^2 (\theta - \theta_s)$. The wire moves by
+    $2 r \theta$ (eq. 3.7): of a plain drum, on which it moves by the radius times the angle, r is half of the radius.
     """
 
-    pulley_radius: Scalar = parameter("m", 1e-4, 1.0, "r: Table 3.1 says diameter, eq. 3.7 and the stroke say radius")
+    pulley_radius: Scalar = parameter(
+        "m", 1e-4, 1.0, "r: the wire moves by 2 r a radian (eq. 3.7); half of the radius of a plain drum"
+    )
     arm_length: Scalar = parameter("m", 1e-3, 10.0, "L: not printed")
     payload_mass: Scalar = parameter("kg", 0.0, 1e2, "m_p")
     link_mass: Scalar = parameter("kg", 1e-5, 1e2, "m_a")
