@@ -41,9 +41,13 @@ def and_listed(names: Sequence[str]) -> str:
     return f"{between.join(names[:-1])} and {names[-1]}"
 
 
-def verdict_text(verdict: str, coefficients_at_bounds: Sized, unknowns_at_bounds: Sized = ()) -> str:
-    """`explained`; `explained, at a bound` where coefficients of what was added, or unknowns of the experiment, end at a bound."""
-    return f"{verdict}, at a bound" if coefficients_at_bounds or unknowns_at_bounds else verdict
+def verdict_text(verdict: str, coefficients_at_bounds: Sized, unknowns_at_bounds: Sized = (), doubt: str = "") -> str:
+    """`explained`; `explained, at a bound` where coefficients of what was added, or unknowns of the experiment, end at a bound.
+
+    `doubt`: what other runs than those of the fit leave of it (`report.json`), as in `explained, not confirmed`.
+    """
+    at_bound = "at a bound" if coefficients_at_bounds or unknowns_at_bounds else ""
+    return ", ".join(one for one in (verdict, at_bound, doubt) if one)
 
 
 def aligned(rows: Sequence[Sequence[str]], right: bool = False) -> list[str]:

@@ -25,7 +25,7 @@ from smajax.report.narrative.caveats import zero_so_far
 from smajax.report.narrative.rounds import chosen_text
 from smajax.report.narrative.unknown import units
 from smajax.report.narrative.values import far_text
-from smajax.report.narrative.verdict import headline
+from smajax.report.narrative.verdict import doubt, headline
 from smajax.report.next_steps import Step, section
 from smajax.report.plain_page import MANY, breakable
 from smajax.report.predict_words import MOVES
@@ -199,7 +199,9 @@ def _figures(findings: Findings, output: Callable[[float | None], Shown]) -> lis
     figures.append(
         {
             "caption": "verdict",
-            "text": verdict_text(findings.verdict, findings.coefficients_at_bounds, unknowns_at_bounds(findings)),
+            "text": verdict_text(
+                findings.verdict, findings.coefficients_at_bounds, unknowns_at_bounds(findings), doubt(findings)
+            ),
             "kind": "verdict",
         }
     )

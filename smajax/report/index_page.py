@@ -55,6 +55,7 @@ class ReportRow:
     written: float  # s since 1970: when the record was written
     coefficients_at_bounds: tuple[str, ...] = ()  # of those effects
     unknowns_at_bounds: tuple[str, ...] = ()  # of the experiment
+    doubt: str = ""  # that runs which the fit did not see leave of the verdict
 
     @property
     def noises(self) -> float | None:
@@ -92,6 +93,7 @@ def read_report(path: Path, searched: Path) -> ReportRow:
             written=path.stat().st_mtime,
             coefficients_at_bounds=tuple(map(str, record.get("coefficients_at_bounds", ()))),
             unknowns_at_bounds=tuple(map(str, record.get("unknowns_at_bounds", ()))),
+            doubt=str(record.get("held_out_runs", "")),
             **errors,
         )
     except (AttributeError, KeyError, TypeError, ValueError) as error:
@@ -121,7 +123,7 @@ def cells(row: ReportRow) -> list[str]:
     errors = (row.fit_before, row.fit_after, row.held_out_before, row.held_out_after)
     return [
         row.title,
-        verdict_text(row.verdict, row.coefficients_at_bounds, row.unknowns_at_bounds),
+        verdict_text(row.verdict, row.coefficients_at_bounds, row.unknowns_at_bounds, row.doubt),
         *map(error, errors),
         digits(row.noises, 3, zeros=True),
         ", ".join(map(label, row.effects)) or "–",

@@ -28,6 +28,7 @@ from smajax.attribution.verdict import unknowns_at_bounds
 from smajax.report.identifiability_words import remark_text
 from smajax.report.narrative import Narrative, narrate
 from smajax.report.narrative.rounds import chosen_text
+from smajax.report.narrative.verdict import doubt
 
 # (where, key of before) -> key of today; "" is the top. The old ones are read until version 0.3.
 RENAMED: Mapping[tuple[str, str], str] = {
@@ -196,6 +197,7 @@ def findings_to_json(findings: Findings, narrative: Narrative | None = None) -> 
         "verdict": findings.verdict,
         **({"coefficients_at_bounds": at_bounds} if at_bounds else {}),
         **({"unknowns_at_bounds": unknowns} if unknowns else {}),
+        **({"held_out_runs": why} if (why := doubt(findings)) else {}),
         "remaining": findings.remaining,
         "effects_excluded": findings.effects_excluded,
         "summary": words.summary,

@@ -239,3 +239,13 @@ def test_a_result_that_ends_at_a_bound_is_not_green(folder: Path, client: TestCl
     page = client.get("/result").text
     assert "Verdict: explained, at a bound" in page
     assert '<section class="answer fair">' in page
+
+
+def test_a_result_that_held_out_runs_do_not_confirm_is_not_green(folder: Path, client: TestClient) -> None:
+    (folder / "report").mkdir()
+    (folder / "report" / "report.html").write_text("", encoding="utf-8")
+    record = {"verdict": "explained", "held_out_runs": "not confirmed", "runs": []}
+    (folder / "report" / "report.json").write_text(json.dumps(record), encoding="utf-8")
+    page = client.get("/result").text
+    assert "Verdict: explained, not confirmed" in page
+    assert '<section class="answer fair">' in page

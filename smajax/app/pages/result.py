@@ -38,11 +38,12 @@ def shown(project: Project, result: Result) -> dict[str, Any]:
     """What the page says of one result folder."""
     record = project.record_of(result)
     at_bounds = [*(record.get("coefficients_at_bounds") or []), *(record.get("unknowns_at_bounds") or [])]
+    why = record.get("held_out_runs", "")
     return {
         "result": result,
         "title": record.get("title", ""),
-        "verdict": verdict_text(record.get("verdict", ""), at_bounds),
-        "tone": "fair" if at_bounds else TONES.get(record.get("verdict", ""), "plain"),
+        "verdict": verdict_text(record.get("verdict", ""), at_bounds, doubt=why),
+        "tone": "fair" if at_bounds or why else TONES.get(record.get("verdict", ""), "plain"),
         "remaining": record.get("remaining", ""),
         "sentences": record.get("summary") or record.get("conclusions") or [],
         "runs": _runs(record) if result.command == "close-loop" else [],

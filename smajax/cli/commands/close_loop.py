@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shlex
 import sys
-from collections.abc import Sequence, Sized
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -81,16 +81,17 @@ def _rounds_shown(out: Path) -> int:
 
 def print_findings(findings: Findings, page: Path) -> None:
     from smajax.attribution.verdict import unknowns_at_bounds
+    from smajax.core.wording import verdict_text
     from smajax.report.narrative import narrate
+    from smajax.report.narrative.verdict import doubt
 
     at_bounds = (*findings.coefficients_at_bounds, *unknowns_at_bounds(findings))
-    _print_answer(findings.title, findings.verdict, at_bounds, narrate(findings).summary, page)
+    said = verdict_text(findings.verdict, at_bounds, doubt=doubt(findings))
+    _print_answer(findings.title, said, narrate(findings).summary, page)
 
 
-def _print_answer(title: str, verdict: str, at_bounds: Sized, summary: Sequence[str], page: Path) -> None:
-    from smajax.core.wording import verdict_text
-
-    typer.echo(f"\n{title}\nVerdict: {verdict_text(verdict, at_bounds)}")
+def _print_answer(title: str, verdict: str, summary: Sequence[str], page: Path) -> None:
+    typer.echo(f"\n{title}\nVerdict: {verdict}")
     for sentence in summary:
         typer.echo(f"  {sentence}")
     typer.echo(f"Report: {page.resolve()}")
@@ -99,6 +100,7 @@ def _print_answer(title: str, verdict: str, at_bounds: Sized, summary: Sequence[
 def _within(seconds: float, out: Path, json_out: bool) -> None:
     """The command without --budget, ended in that time; then the page says what is known. Exits with 3 where it was ended."""
     from smajax.cli.budget import run_within, without
+    from smajax.core.wording import verdict_text
 
     before = (out / RECORD).stat().st_mtime_ns if (out / RECORD).is_file() else None
     code = run_within(seconds, without(sys.argv[1:], "--budget"))
@@ -117,7 +119,8 @@ def _within(seconds: float, out: Path, json_out: bool) -> None:
         typer.echo(json.dumps(known))
     else:
         at_bounds = [*known.get("coefficients_at_bounds", []), *known.get("unknowns_at_bounds", [])]
-        _print_answer(known["title"], known["verdict"], at_bounds, known["summary"], out / "report.html")
+        said = verdict_text(known["verdict"], at_bounds, doubt=known.get("held_out_runs", ""))
+        _print_answer(known["title"], said, known["summary"], out / "report.html")
     typer.echo(f"The time was over before: {known['remaining'] or 'the controllers were tuned'}; {resumes}.", err=True)
     raise typer.Exit(UNMET)
 

@@ -47,15 +47,45 @@ UNKNOWN_AT_A_BOUND = {
     Verdict.ADEQUATE: ("Adequate, but an unknown ends at a bound", "fair"),
     Verdict.EXPLAINED: ("Explained, but an unknown ends at a bound. Added", "fair"),
 }
+NOT_CONFIRMED, NOT_EVERY_RUN = "not confirmed", "not on every held-out run"
+DOUBTFUL = {
+    NOT_CONFIRMED: ("Explained on the fit runs, but not confirmed by held-out runs", "fair"),
+    NOT_EVERY_RUN: ("Explained on the fit runs, but not on every held-out run", "fair"),
+}
+OF_ONE_RUN = ("Explained on the one fit run, and no other run confirms it", "fair")
 
 
 def headline(findings: Findings) -> tuple[str, str]:
-    """(headline of the page, its tone): what ends at a bound, a coefficient of an effect or an unknown, is not what a reader may trust."""
+    """(headline of the page, its tone): what ends at a bound, a coefficient of an effect or an unknown, is not what a reader may trust.
+
+    Nor is what the fit runs alone say.
+    """
     if findings.verdict is Verdict.EXPLAINED and findings.coefficients_at_bounds:
         return AT_A_BOUND
     if unknowns_at_bounds(findings):
         return UNKNOWN_AT_A_BOUND[findings.verdict]
+    if why := doubt(findings):
+        return DOUBTFUL[why] if _held_out(findings) else OF_ONE_RUN
     return MANY_STAND_IN if _stand_in(findings) else VERDICTS[findings.verdict]
+
+
+def doubt(findings: Findings) -> str:
+    """What runs that the fit did not see leave of a model that explains the fit runs: empty where they confirm it.
+
+    `not confirmed` where they are not predicted better than by the base model beyond chance, or where there is one fit run and no
+    other; `not on every held-out run` where one of them is off by more than the fit runs.
+    """
+    if findings.verdict is not Verdict.EXPLAINED:
+        return ""
+    if not _held_out(findings):
+        return NOT_CONFIRMED if findings.fit_runs < 2 else ""
+    if caveats.held_out_comparison(findings) != "better":
+        return NOT_CONFIRMED
+    return NOT_EVERY_RUN if caveats.held_out_off(findings) else ""
+
+
+def _held_out(findings: Findings) -> bool:
+    return any(run.role == "held-out" for run in findings.runs)
 
 
 def _stand_in(findings: Findings) -> bool:
@@ -199,7 +229,7 @@ def _partly(findings: Findings) -> str:
 def _explained(findings: Findings) -> str:
     """As sure as the runs allow: one fit run and none held out confirm nothing, and a held-out run that is off says the contrary."""
     listed = and_listed([effect.title for effect in findings.added])
-    if findings.fit_runs > 1 or any(run.role == "held-out" for run in findings.runs):
+    if findings.fit_runs > 1 or _held_out(findings):
         off = caveats.held_out_off(findings)
         but = f", but not on {and_listed([run.name for run in off])}, held out: more may be missing" if off else ""
         doubtful = findings.coefficients_at_bounds or unknowns_at_bounds(findings)
@@ -213,8 +243,7 @@ def _explained(findings: Findings) -> str:
 
 def _unconfirmed(findings: Findings) -> list[str]:
     """That the held-out runs do not tell the extended model from the base model."""
-    held_out = any(run.role == "held-out" for run in findings.runs)
-    if not (findings.added and held_out) or caveats.held_out_comparison(findings) != "alike":
+    if not (findings.added and _held_out(findings)) or caveats.held_out_comparison(findings) != "alike":
         return []
     return [
         "The held-out runs neither confirm nor refute it: how far the base model and the extended model differ there may be chance."

@@ -1,0 +1,86 @@
+"""The headline claims no more than the held-out runs bear out: on the page, in the terminal, in the record and in the list of reports."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from smajax.attribution.findings import Findings, RunFinding, Verdict
+from smajax.cli.commands.close_loop import print_findings
+from smajax.report.html import findings_to_html
+from smajax.report.index_page import cells, read_reports
+from smajax.report.json_file import findings_to_json
+from smajax.report.narrative import narrate
+from smajax.report.narrative.verdict import headline
+from tests.helpers.made_findings import made_findings
+
+
+def _off(run: RunFinding, by: float) -> RunFinding:
+    """The run with a wave of that size (m) beside what the final model predicts of it."""
+    after = run.after + by * np.sin(np.arange(len(run.after)) / 7.0)
+    return dataclasses.replace(run, after=after, rmse_after=float(np.sqrt(np.mean((run.measured - after) ** 2))))
+
+
+def _unconfirmed(verdict: Verdict = Verdict.EXPLAINED) -> Findings:
+    """`made_findings` whose final model is off on the held-out runs by as much as the base model."""
+    findings = made_findings()
+    runs = tuple(_off(one, 1.5 * one.rmse_before) if one.role == "held-out" else one for one in findings.runs)
+    return dataclasses.replace(findings, runs=runs, verdict=verdict)
+
+
+def _partly_confirmed() -> Findings:
+    """The same where it is much better than the base model on them, and clearly worse than on the fit runs."""
+    findings = made_findings()
+    runs = tuple(_off(one, 0.3 * one.rmse_before) if one.role == "held-out" else one for one in findings.runs)
+    return dataclasses.replace(findings, runs=runs)
+
+
+def _of_one_run() -> Findings:
+    findings = made_findings()
+    return dataclasses.replace(findings, runs=tuple(one for one in findings.runs if one.role == "fit")[:1])
+
+
+@pytest.mark.usefixtures("blank_pictures")
+@pytest.mark.parametrize(
+    ("findings", "doubt", "title"),
+    [
+        (_unconfirmed(), "not confirmed", "Explained on the fit runs, but not confirmed by held-out runs"),
+        (_partly_confirmed(), "not on every held-out run", "Explained on the fit runs, but not on every held-out run"),
+        (_of_one_run(), "not confirmed", "Explained on the one fit run, and no other run confirms it"),
+        (made_findings(), "", "The missing physics is found"),
+    ],
+    ids=["unconfirmed", "partly", "one run", "confirmed"],
+)
+def test_page_terminal_record_and_list_say_the_same_of_what_is_not_confirmed(
+    findings: Findings, doubt: str, title: str, tmp_path: Path, capsys: Any
+) -> None:
+    verdict = f"explained, {doubt}" if doubt else "explained"
+    page = findings_to_html(findings)
+    assert f'<header class="answer {"fair" if doubt else "good"}"' in page
+    assert f"<h1>{title}: latent heat of transformation</h1>" in page
+    assert f"<dd>{verdict}</dd>" in page
+    record = findings_to_json(findings)
+    assert record["verdict"] == "explained"
+    assert record.get("held_out_runs", "") == doubt
+    print_findings(findings, tmp_path / "report.html")
+    assert f"Verdict: {verdict}" in capsys.readouterr().out.splitlines()
+    (tmp_path / "report.json").write_text(json.dumps(record), encoding="utf-8")
+    rows, _ = read_reports(tmp_path)
+    assert [cells(row)[1] for row in rows] == [verdict]
+
+
+def test_the_text_agrees_with_the_headline() -> None:
+    said = " ".join(narrate(_unconfirmed()).summary)
+    assert "neither confirm nor refute" in said or "does worse than the base model" in said
+    assert "held out: more may be missing" in narrate(_partly_confirmed()).summary[0]
+    assert "nothing confirms it" in narrate(_of_one_run()).summary[0]
+
+
+def test_another_verdict_has_its_own_headline_whatever_the_held_out_runs_say() -> None:
+    assert headline(_unconfirmed(Verdict.PARTLY_EXPLAINED)) == ("Part of the missing physics is found", "fair")
+    assert "held_out_runs" not in findings_to_json(_unconfirmed(Verdict.PARTLY_EXPLAINED))
