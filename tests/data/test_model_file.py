@@ -85,7 +85,7 @@ def test_a_system_first_asked_for_inside_a_traced_function_is_of_numbers(traced:
         assert not isinstance(mine, jax.core.Tracer)
         assert mine == theirs
     # What is not kept may be of tracers; it is there.
-    assert jax.tree.structure(seen[1]) == jax.tree.structure(fresh.plants(3))
+    assert len(jax.tree.leaves(seen[1])) == len(jax.tree.leaves(fresh.plants(3)))
 
 
 def test_presets_are_such_a_file_and_build_the_same_system(tmp_path: Path) -> None:
