@@ -13,7 +13,7 @@ only strong effects are added; the better the model, the finer the effects that 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from smajax.attribution.fit_programs import grouped
 from smajax.attribution.fitted_sets import JointRound, JointSearch
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model
 from smajax.attribution.program_fits import MOST_WIDENED, BegunFit, comparison_settings, models_by_program
+from smajax.attribution.round_cache import Asked, key_of_round, loaded_round, save_round
 from smajax.attribution.set_starts import at_usual_size, starts
 from smajax.attribution.subset_evidence import LinearModel, Subset, linear_model
 from smajax.attribution.traces import Traces, Variant, traces_at
@@ -74,11 +75,10 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
             if other is not None:
                 ended, present, error = [*ended, present], noted(search, present, other), search.error(other)
         search.joint = dataclasses.replace(search.joint, width_factors=present.width_factors)
-        linear, traces = _linear(search, present, error)
         last = present.effects in checked
-        sets = _neighbours(search, linear, present, error) if last else _promising(search, linear, present, error)
-        if sets:
-            _fit(search, sets, linear, traces, error, number)
+        asked = _asked(search, present, error, _neighbours if last else _promising)
+        if asked.begun:
+            _fit_side_by_side(search, asked.begun, error, _stage(search, number))
         best, before = search.best(error), present.log_evidence(error**2)
         gain = best.log_evidence(error**2) - before
         if best.effects in left - {present.effects} and gain < SETTLED_ODDS:
@@ -87,7 +87,7 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
             gain = best.log_evidence(error**2) - before
         gains = tuple(
             (effects, search.fitted[effects].log_evidence(error**2) - before, search.fitted[effects].rms)
-            for effects in dict.fromkeys(_effects(search, one) for one in sets)
+            for effects in dict.fromkeys(asked.sets)
             if effects in search.fitted  # a set whose fits have no number is none
         )
         done = JointRound(error, present.effects, gains, best.effects, gain)
@@ -112,8 +112,8 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
                 checked.add(other.effects)
             elif present.effects not in widened:
                 widened.add(present.effects)
-                # `traces` are those of the model that the round began with.
-                several = None if moved else _several_at_once(search, present, traces, error, number)
+                # The traces are those of the model that the round began with.
+                several = None if moved else _several_at_once(search, present, asked.traces, error, number)
                 other = several or search.before_the_end(present)
                 other = other and noted(search, present, other)
             if other is None:
@@ -218,7 +218,7 @@ def _neighbours(search: JointSearch, linear: LinearModel, present: FittedModel, 
 
 
 def _several_at_once(
-    search: JointSearch, present: FittedModel, traces: Traces, error: float, number: int
+    search: JointSearch, present: FittedModel, traces_there: Callable[[], Traces], error: float, number: int
 ) -> FittedModel | None:
     """A model with several effects more that leaves little more than noise, where no one effect more makes `present`, of few effects, likelier.
 
@@ -230,6 +230,7 @@ def _several_at_once(
     if error < UNEXPLAINED * search.noise or len(present.effects) >= MANY:
         return None
     level = float(np.sqrt(error * search.noise))
+    traces = traces_there()
     linear = _climbed(search, present, traces, level)
     sets: dict[tuple[str, ...], Subset] = {}
     for subset in linear.ranked()[:REACHED]:
@@ -238,7 +239,8 @@ def _several_at_once(
             sets.setdefault(effects, subset)
     if not sets:
         return None
-    _fit(search, list(sets.values())[:AT_ONCE], linear, traces, level, number)
+    begun = _begun(search, list(sets.values())[:AT_ONCE], linear, traces, level)
+    _fit_side_by_side(search, begun, level, _stage(search, number))
     fitted = [search.fitted[effects] for effects in sets if effects in search.fitted]
     better = [one for one in fitted if one.rms < UNEXPLAINED * search.noise and search.error(one) < error]
     best = max(better, key=lambda one: _gain(search, present, one), default=None)
@@ -269,27 +271,54 @@ def _fit_alone(
     shown = [effect for effect in effects if effect in search.detectable]
     if not shown:
         return
-    linear, traces = _linear(search, search.fitted[()], error)
-    places: dict[str, Variant] = {}
-    for one in sorted(linear.places, key=lambda one: -linear.log_evidence(frozenset({one}))):
-        places.setdefault(one.effect, one)
-    sets = [frozenset({one}) for effect, one in places.items() if effect in shown][:most]
-    _fit(search, sets, linear, traces, error, len(search.rounds), least_cost)
+
+    def alone(search: JointSearch, linear: LinearModel, present: FittedModel, error: float) -> list[Subset]:
+        places: dict[str, Variant] = {}
+        for one in sorted(linear.places, key=lambda one: -linear.log_evidence(frozenset({one}))):
+            places.setdefault(one.effect, one)
+        return [frozenset({one}) for effect, one in places.items() if effect in shown][:most]
+
+    begun = _asked(search, search.fitted[()], error, alone, shown, most).begun
+    _fit_side_by_side(search, begun, error, _stage(search, len(search.rounds)), least_cost=least_cost)
 
 
-def _fit(
+def _asked(
     search: JointSearch,
-    sets: Sequence[Subset],
-    linear: LinearModel,
-    traces: Traces,
+    present: FittedModel,
     error: float,
-    number: int,
-    least_cost: float = np.inf,
-) -> None:
-    """Fit the sets, all side by side, from the present values and from where the linear model points to.
+    chosen: Callable[[JointSearch, LinearModel, FittedModel, float], list[Subset]],
+    *settings: object,
+) -> Asked:
+    """What a round fits beside `present`: the sets that are `chosen` in the linear model there, and where their fits begin.
 
-    `least_cost`: of another model at this error, which fits that fall far behind are not worth their time beside.
+    `settings`: what `chosen` depends on beside its arguments. Cached: tracing the programs of the linear model takes most of the time
+    in which a search that resumes comes to where it was.
     """
+    cache, joint, candidates = search.settings.cache, search.joint, search.detectable or None
+    key = key_of_round(search, present, error, chosen.__name__, *settings)
+    known = loaded_round(cache, key, lambda: traces_at(joint, present, search.extent, candidates))
+    if known is not None:
+        search.detectable, search.programs = known.detectable, known.programs
+        return known
+    linear, traces = _linear(search, present, error)
+    sets = chosen(search, linear, present, error)
+    begun = _begun(search, sets, linear, traces, error)
+    effects = tuple(_effects(search, one) for one in sets)
+    asked = Asked(effects, tuple(begun), search.detectable, search.programs, lambda: traces)
+    save_round(cache, key, asked)
+    return asked
+
+
+def _stage(search: JointSearch, number: int) -> str:
+    return f"round {search.rounds_before + number + 1} ({USUAL_ROUNDS}): fitting the likeliest sets of effects"
+
+
+def _begun(
+    search: JointSearch, sets: Sequence[Subset], linear: LinearModel, traces: Traces, error: float
+) -> list[BegunFit]:
+    """Fits of the sets, from the present values and from where the linear model points to."""
+    if not sets:
+        return []
     joint = dataclasses.replace(search.joint, width_factors={**search.joint.width_factors, **linear.width_factors})
     begun: list[BegunFit] = []
     groups = _grouped(search, [_effects(search, subset) for subset in sets])
@@ -305,8 +334,7 @@ def _fit(
                 # And, where an effect is new, from its usual size: near zero the misfit may have a minimum of its own.
                 usual = at_usual_size(joint, subset, traces, start)
                 begun.append(BegunFit(effects, usual, linear.width_factors))
-    stage = f"round {search.rounds_before + number + 1} ({USUAL_ROUNDS}): fitting the likeliest sets of effects"
-    _fit_side_by_side(search, begun, error, stage, least_cost=least_cost)
+    return begun
 
 
 def _fit_side_by_side(
@@ -319,7 +347,7 @@ def _fit_side_by_side(
 ) -> None:
     """Fit sets of effects, those of one program side by side; the better of two fits of one set counts.
 
-    `compared`: those that fall far behind the others, or `least_cost`, end early.
+    `compared`: those that fall far behind the others, or `least_cost` (of another model at this error), end early.
     """
     joint = search.joint
     search.settings.progress(Stage(stage, 0.0))

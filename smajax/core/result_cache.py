@@ -46,13 +46,13 @@ class ResultCache:
         content = [one if isinstance(one, np.ndarray) else repr(one) for one in settings]
         return digest(work, content)[:32]
 
-    def load(self, key: str) -> dict[str, np.ndarray] | None:
-        """The record cached under `key`; None on a miss."""
+    def load(self, key: str, *, counted: bool = True) -> dict[str, np.ndarray] | None:
+        """The record cached under `key`; None on a miss. `counted`: among what was reused, as a fit is."""
         path = self._path(key)
         if path is None or not path.exists():
             return None
         record = arrays(path)
-        self.reused += record is not None and key not in self._own
+        self.reused += counted and record is not None and key not in self._own
         return record
 
     def save(self, key: str, record: Mapping[str, Any], *, last: bool = True) -> None:
