@@ -74,6 +74,12 @@ class JointParameters:
                 priors[name] = overridden(own, declared.coefficients.get(name), bounds[name])
         return cls(problem, (*unknowns, *presets), bounds, coefficients, priors, log_odds)
 
+    @property
+    def described(self) -> tuple[object, ...]:
+        """All that it holds beside the problem, for the key of a cached result."""
+        maps = self.bounds, self.coefficients, self.priors, self.log_odds, self.width_factors
+        return self.unknowns, *(dict(one) for one in maps)
+
     @cached_property
     def slots(self) -> dict[str, int]:
         """Place of every parameter in the vector of all."""

@@ -10,7 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from smajax.attribution.joint_parameters import JointParameters
-from smajax.attribution.laplace_evidence import FittedModel, fitted_model
+from smajax.attribution.laplace_evidence import FittedModel
+from smajax.attribution.model_cache import cached_model
 from smajax.core.progress import part_of
 from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
 from smajax.fit.priors import Priors
@@ -101,7 +102,7 @@ def models_by_program(
         wider: dict[tuple[str, ...], list[BegunFit]] = {}
         for effects, fit in least.items():
             # Coefficients of other effects count for nothing in this model.
-            model = fitted_model(joint, effects, joint.without(fit.values, effects), fit.program)
+            model = cached_model(joint, effects, joint.without(fit.values, effects), fit.program, settings.cache)
             yield model
             if any(model.width_factors[one] > WIDENED * used[effects].get(one, 1.0) for one in effects):
                 wider.setdefault(fit.program, []).append(BegunFit(effects, model.values, model.width_factors))

@@ -30,14 +30,6 @@ def key_of_round(search: JointSearch, present: FittedModel, error: float, *setti
     cache, joint = search.settings.cache, search.joint
     if cache.folder is None:
         return ""
-    of_joint = (
-        joint.unknowns,
-        dict(joint.bounds),
-        dict(joint.coefficients),
-        dict(joint.priors),
-        dict(joint.log_odds),
-        dict(joint.width_factors),
-    )
     of_search = (
         search.extent,
         search.noise,
@@ -48,7 +40,7 @@ def key_of_round(search: JointSearch, present: FittedModel, error: float, *setti
         search.trials,
     )
     of_present = present.effects, present.width_factors, np.asarray(present.values), np.asarray(present.residual)
-    return cache.key(joint.problem, "round", *of_joint, *of_search, *of_present, float(error), *settings)
+    return cache.key(joint.problem, "round", *joint.described, *of_search, *of_present, float(error), *settings)
 
 
 def loaded_round(cache: ResultCache, key: str, traces: Callable[[], Traces]) -> Asked | None:
