@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -37,11 +38,11 @@ def cached_model(
 
 def _model(record: Mapping[str, np.ndarray]) -> FittedModel:
     words = json.loads(str(record["words"]))
+    found: dict[str, Any] = {**{name: record[name] for name in ARRAYS}, **{name: words[name] for name in NUMBERS}}
     return FittedModel(
         effects=tuple(words["effects"]),
         names=tuple(words["names"]),
         width_factors=words["width_factors"],
         one_sided=tuple((place, widths) for place, widths in words["one_sided"]),
-        **{name: record[name] for name in ARRAYS},
-        **{name: words[name] for name in NUMBERS},
+        **found,
     )

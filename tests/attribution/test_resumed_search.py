@@ -12,6 +12,7 @@ from smajax.attribution import joint_search, model_cache
 from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.joint_search import search_jointly
 from smajax.attribution.laplace_evidence import FittedModel
+from smajax.attribution.traces import traces_at
 from smajax.core.result_cache import ResultCache
 from smajax.fit.levenberg_marquardt import FitSettings
 from tests.helpers.hot_weight import hot_weight
@@ -58,7 +59,6 @@ def test_a_search_that_was_ended_between_two_rounds_goes_on_as_if_it_had_not_bee
     whole, found = _searched(tmp_path / "whole")
     with monkeypatch.context() as once:
         calls: list[int] = []
-        traces_at = joint_search.traces_at
 
         def ended(*given: object) -> object:
             calls.append(1)
