@@ -369,6 +369,7 @@ def test_two_models_that_are_as_likely_do_not_take_turns(monkeypatch: pytest.Mon
     """Seen from each the other is the likelier one, by less than a unit: the search ends instead of going from one to the other."""
     one, other = _Alike(("creep",), 1.0, 0.2), _Alike(("slack",), 1.02, 0.2)
     search: Any = JointSearch(*([_Nothing()] * 4))  # type: ignore[arg-type]
+    search.settings = FitSettings()
     search.fitted = {one.effects: one, other.effects: other}
     monkeypatch.setattr(fitted_sets, "independent_error", lambda model, *_: model.rms)
     monkeypatch.setattr(joint_search, "_grouped", lambda *_: [])
