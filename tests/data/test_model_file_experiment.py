@@ -71,6 +71,30 @@ def test_values_of_single_runs_are_those_of_the_bench_and_a_range(tmp_path: Path
     same(made, load_model(made.save(tmp_path / "made.toml")))
 
 
+@pytest.mark.parametrize("common", ["0.9 kg", ""])
+def test_the_value_of_the_runs_without_their_own_stays_that_of_the_model(tmp_path: Path, common: str) -> None:
+    given = f'[model.parameters]\nload_mass = "{common}"\n[unknown]\n' if common else "[unknown]\n"
+    own = 'parameters = { load_mass = "0.64 kg" }'
+    more = f'file = "a.csv"\n[[runs]]\nname = "partial"\nrole = "fit"\nfile = "a.csv"\n{own}'
+    experiment = open_experiment(bench(tmp_path, ("[unknown]\n", given), ('file = "a.csv"', more)))
+    likely = [LikelyModel((), 1.0, {"convection_coefficient": 120.0})]
+    made = actuator_model(experiment, likely, {"convection_coefficient": (40.0, 400.0)}, {}, [], {})
+    used = parameter_values(base_model(experiment))["load_mass"]
+    assert used == (0.9 if common else 0.075)
+    assert made.values["load_mass"] == used
+    assert made.parameters["load_mass"].origin == ("given" if common else "preset")
+    assert made.fitted_range["load_mass"] == (min(0.64, used), max(0.64, used))
+
+
+def test_a_given_value_stays_where_every_run_has_its_own(tmp_path: Path) -> None:
+    given = '[model.parameters]\nload_mass = "0.9 kg"\n[unknown]\n'
+    own = 'file = "a.csv"\nparameters = { load_mass = "0.64 kg" }'
+    experiment = open_experiment(bench(tmp_path, ("[unknown]\n", given), ('file = "a.csv"', own)))
+    made = actuator_model(experiment, [LikelyModel((), 1.0, {"convection_coefficient": 120.0})], {}, {}, [], {})
+    assert made.values["load_mass"] == 0.9
+    assert made.fitted_range["load_mass"] == (0.64, 0.64)
+
+
 def test_fitted_values_that_no_run_determined_take_part_in_a_following_loop(tmp_path: Path) -> None:
     undetermined_model().save(tmp_path / "model.toml")
     presets = 'wire = "flexinol_table_3_2"\nload = "dead_weight"\ndrive = "voltage"\n'

@@ -49,22 +49,28 @@ def actuator_model(
         parameters=values,
         outputs=tuple(outputs),
         likely=tuple(likely),
-        fitted_range={**fitted_range, **_ranges_of_runs(experiment)},
+        fitted_range={**fitted_range, **_ranges_of_runs(experiment, values)},
         runs=tuple(FittedRun(run.name, run.role, run.sha256) for run in experiment.runs),
         log_format=experiment.log_format,
         made_with={"experiment": experiment.path.name},
     )
 
 
-def _ranges_of_runs(experiment: Experiment) -> dict[str, tuple[float, float]]:
-    """Lowest and highest of the parameters that fit runs have their own values of."""
+def _ranges_of_runs(experiment: Experiment, values: Mapping[str, ModelParameter]) -> dict[str, tuple[float, float]]:
+    """Lowest and highest of the parameters that fit runs have their own values of; a run without one has the model's."""
     fit = [run for run in experiment.runs if run.role == "fit"]
     names = {name for run in fit for name in run.parameters if name != "initial_temperature"}
-    return {
-        name: (rounded(min(values)), rounded(max(values)))
-        for name in sorted(names)
-        if (values := [run.parameters[name] for run in fit if name in run.parameters])
-    }
+    ranges = {}
+    for name in sorted(names):
+        of_runs = [run.parameters[name] for run in fit if name in run.parameters]
+        of_runs += [values[name].value] * (name in values and bool(_without_own(fit, name)))
+        ranges[name] = (rounded(min(of_runs)), rounded(max(of_runs)))
+    return ranges
+
+
+def _without_own(runs: Iterable[Run], name: str) -> list[Run]:
+    """The runs that neither log a parameter nor have their own value of it: they are simulated with the experiment's."""
+    return [run for run in runs if name not in run.parameters and REPLACED.get(name, "") not in run.inputs]
 
 
 def _parameter(
@@ -97,10 +103,13 @@ def _parameter(
 def _logged(experiment: Experiment, name: str) -> float | None:
     """The median over the fit runs of what an input channel, or each run's own value, gives in the place of a parameter; else None.
 
-    Runs have their own, but a closed loop or a simulation without them is of this bench all the same.
+    Runs have their own, but a closed loop or a simulation without them is of this bench all the same. None too where the experiment's
+    value is that of a fit run, or is given beside runs with their own: the model then keeps it, and predicts such a run as it was fitted.
     """
     channel = REPLACED.get(name, "")
     fit = [run for run in experiment.runs if run.role == "fit"]
+    if _without_own(fit, name) or (name in experiment.parameters and not any(channel in run.inputs for run in fit)):
+        return None
     series = [run.inputs[channel] for run in fit if channel in run.inputs]
     series += [
         np.asarray([run.parameters[name]]) for run in fit if name in run.parameters and channel not in run.inputs
