@@ -15,7 +15,7 @@ from smajax.control.load_equation import moving_load, stroke_of
 from smajax.control.position_unit import SHARES, PositionUnit, band_shown, unit_of
 from smajax.control.scales import seconds_for
 from smajax.core.display_units import digits
-from smajax.core.parameters import parameter_values
+from smajax.core.parameters import parameter_values, parameters
 from smajax.model.system import System
 from smajax.simulation.compiled import simulate_compiled
 
@@ -32,6 +32,7 @@ class Reach(NamedTuple):
     high: float
     command: float
     unit: PositionUnit
+    by_drive: bool = True  # whether the largest command is the drive's; False: the controller's own
 
     def words(self) -> str:
         """`with up to 5 V this load comes to rest between 0 and 12.3 mm`."""
@@ -47,7 +48,8 @@ def reach_of(system: System, controller: AbstractController | None = None) -> Re
     """
     load = moving_load(system)
     own = {} if controller is None else parameter_values(controller)
-    largest = min(float(system.drive.largest_command()), own.get(LARGEST, math.inf))
+    of_drive, of_controller = float(system.drive.largest_command()), own.get(LARGEST, math.inf)
+    largest = min(of_drive, of_controller)
     if not math.isfinite(largest) or load.inputs_required:
         return None
     samples = round(LONGER * seconds_for(system) / STEP) + 1
@@ -60,7 +62,7 @@ def reach_of(system: System, controller: AbstractController | None = None) -> Re
         return None
     unit = unit_of(system)
     low, high = float(unit.of(np.min(ends))), float(unit.of(np.max(ends)))
-    return Reach(low, high, largest, unit)
+    return Reach(low, high, largest, unit, of_drive <= of_controller)
 
 
 def shared_set_points(systems: Iterable[System], count: int) -> tuple[float, ...]:
@@ -98,12 +100,17 @@ def reach_sentence(reach: Reach | None, system: System, set_points: Sequence[flo
         return ""
     several = len(beyond) > 1
     named = ", ".join(f"{point:g}" for point in beyond)
-    higher = (
-        " a higher limit of the command (--set amplifier_limit=..., largest_voltage of the gains),"
-        if max(beyond) > reach.high
-        else ""
-    )
+    higher = f" a higher limit of the command ({_raised(reach, system)})," if max(beyond) > reach.high else ""
     return (
         f"The set point{'s' * several} {named} {reach.unit.shown} {'are' if several else 'is'} out of reach of every controller: {reach.words()}. "
         f"Give a set point within,{higher} or another load (--set)."
     )
+
+
+def _raised(reach: Reach, system: System) -> str:
+    """What raises the limit of the command that holds: parameters of the drive, of an amplifier also where its controller has the lower one."""
+    table = parameters(system.drive)
+    options = [f"--set {name}=..." for name in ("amplifier_limit", "supply_voltage") if name in table]
+    if not reach.by_drive:
+        options.append("largest_voltage of the gains file (--gains, --start)")
+    return " or ".join(options)

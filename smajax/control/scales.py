@@ -41,6 +41,10 @@ from smajax.model.wire.heat import convection, mass_per_metre
 from smajax.model.wire.resistance import resistance_per_metre
 
 HEADROOM = 1.33  # largest command over the one that holds, of the arm's presets
+ARM_LIMIT = 10.0  # V, the largest command of the arm's presets
+NO_LIMIT = (
+    999.0  # V at the wire; an amplifier's limit from here on is the presets' 1000 V, which says that nobody knows it
+)
 POINTS = 65  # along the stroke
 Module = TypeVar("Module", bound=eqx.Module)
 
@@ -164,6 +168,28 @@ def _product(ratios: Mapping[str, Scalar], powers: Mapping[str, int]) -> Scalar:
 def is_arm(system: System) -> bool:
     """Whether gains of the arm's presets hold as they are."""
     return isinstance(system.load, Arm)
+
+
+def limited_as(system: System) -> Scalar | None:
+    """The largest command of an arm's amplifier or supply, V, where it is known; None where the limits of the presets hold."""
+    limit = system.drive.largest_command()
+    at_wire = get_parameters(system, ["amplifier_limit"])[0] if "amplifier_limit" in parameters(system) else limit
+    return limit if at_wire < NO_LIMIT else None
+
+
+def on_amplifier(controller: Module, system: System, own: frozenset[str]) -> Module:
+    """The controller of an arm whose amplifier or supply has a limit: its largest command is that, other voltages keep their share of it.
+
+    What it knows of its plant (`own`) stays.
+    """
+    limit = limited_as(system)
+    if limit is None:
+        return controller
+    table = parameters(controller)
+    names = [one for one in table if table[one].unit == "V" and not {one, str(table[one].path[0])} & own]
+    values = dict(zip(names, get_parameters(controller, names), strict=True))
+    put = {name: limit if name == "largest_voltage" else value * limit / ARM_LIMIT for name, value in values.items()}
+    return set_parameters(controller, put)
 
 
 def scaled(controller: Module, factors: Mapping[str, Scalar], own: frozenset[str]) -> Module:

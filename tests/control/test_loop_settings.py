@@ -13,7 +13,9 @@ import pytest
 from smajax.cli.commands.sweep import loop_of
 from smajax.control.gains_file import Gains, GainsFileError, read_gains
 from smajax.control.loop_settings import LoopInUse, LoopSettings, joined
-from smajax.control.model_as_plant import noise_of_file
+from smajax.control.model_as_plant import noise_of_file, plant_of
+from smajax.control.presets import CONTROLLERS
+from smajax.control.reach import reach_of
 from smajax.control.run_request import LoopRequest, RunRequest, run_closed
 from smajax.control.run_result import RunResult
 from smajax.data.model_file.of_presets import model_of_presets
@@ -221,3 +223,25 @@ def test_a_set_point_out_of_reach_is_told_apart_from_a_controller_that_fails(tmp
     said = refused(*tune, "--set", "amplifier_limit=5.6 V", "--set-point", "5mm,20mm")
     assert "The set point 20 mm is out of reach of every controller" in said
     assert not (tmp_path / "out").exists()
+
+
+def test_an_arm_is_led_and_tuned_with_the_limit_of_its_amplifier(tmp_path: Path) -> None:
+    """An arm that needs more than the 10 V of the presets: the limit of its runs, of --set and of --start is that of the controller."""
+    plain = model_of_presets("niti_table_3_1", "arm", "voltage")  # without the amplifier of the source's arm
+    kept = dataclasses.replace(plain, fitted_range={"voltage": (0.0, 17.0)})
+    system, _ = plant_of(kept)
+    reach = reach_of(system, CONTROLLERS["pid"].make(system))
+    assert reach is not None
+    assert reach.command == 17.0
+    gains = tmp_path / "gains.json"
+    gains.write_text(json.dumps({**GAINS, "fixed": {"largest_voltage": 6.0}, "loop": {}}), encoding="utf-8")
+    tune: list[str | Path] = ["tune", "pid", "--model", kept.save(tmp_path / "m.toml"), "--set-point", "-20deg,60deg"]
+    said = refused(*tune, "--start", gains, "--out", tmp_path / "out")
+    assert "with up to 6 V this load comes to rest" in said
+    assert "(--set amplifier_limit=... or largest_voltage of the gains file (--gains, --start))" in said
+    said = refused(*tune, "--start", gains, "--set", "amplifier_limit=7V", "--out", tmp_path / "out")
+    assert "with up to 7 V" in said  # --set goes first
+    assert "(--set amplifier_limit=...)" in said
+    weak = RunRequest(model=kept, dt=0.01, seconds=0.1, values={"amplifier_limit": "14 V"})
+    run = run_closed(weak, LoopRequest("", "40deg:0.1s", gains, noise=0.0))
+    assert json.loads(run.data.attrs["gains"])["largest_voltage"] == 14.0

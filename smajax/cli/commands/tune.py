@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -72,6 +72,18 @@ def _initial_gains(start: Path | None, controller: str, plant: System) -> Gains 
     return gains
 
 
+def _limit_of(gains: Gains | None, plant: System, given: bool) -> dict[str, float]:
+    """The controller's limit of the command in a file of gains, where it is not that of the preset on this plant; none where --set gives one."""
+    from smajax.control.gains_file import LARGEST
+    from smajax.control.presets import CONTROLLERS
+    from smajax.core.parameters import parameter_values
+
+    if gains is None or given or LARGEST not in gains.fixed:
+        return {}
+    own = parameter_values(CONTROLLERS[gains.controller].make(plant))[LARGEST]
+    return {} if gains.fixed[LARGEST] == own else {LARGEST: gains.fixed[LARGEST]}
+
+
 def _variation(several: Sequence[str] | None, plant: System) -> dict[str, float]:
     """Raises typer.BadParameter."""
     from smajax.control.mismatch import variation_of
@@ -108,7 +120,7 @@ def _run(
     request = {"tuning": settings.controller}  # the other settings are in a file of the tuning itself, which it checks
     try:
         settings.check(plant, plants)
-        made = CONTROLLERS[settings.controller].make(plant)
+        made = replace(CONTROLLERS[settings.controller], fixed=settings.fixed).make(plant)
         if sentence := reach_sentence(reach_of(plant, made), plant, settings.set_points):
             raise ValueError(sentence)
         with (
@@ -175,7 +187,8 @@ def tune(
     ] = None,
     by: Annotated[str, typer.Option(help="trust-region or adam", autocompletion=completion.rules)] = "trust-region",
     start: Annotated[
-        Path | None, typer.Option(help="gains.json with the initial gains, in place of the preset's")
+        Path | None,
+        typer.Option(help="gains.json with the initial gains and the limit of the command, in place of the preset's"),
     ] = None,
     starts: Annotated[
         int | None, typer.Option(callback=within(1), help="starting points of the search; default 6")
@@ -249,6 +262,7 @@ def tune(
         "period": period,
         "delay": delay,
         "start": None if initial is None else initial.values,
+        "fixed": _limit_of(initial, assumed, plant.gives_limit) or None,
         **_Search(starts, rounds, finish, fast).effort(),
     }
     settings = settings_for(

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 
 from smajax.control.controllers.base import AbstractController
 from smajax.control.load_equation import missing_for_equation, missing_for_stroke
-from smajax.control.scales import factors_for, is_arm, scaled
+from smajax.control.scales import ARM_LIMIT, factors_for, is_arm, limited_as, on_amplifier, scaled
 from smajax.core.parameters import parameters, set_parameters
 from smajax.engine import Engine
 from smajax.model.load.base import AbstractMovingLoad
@@ -31,7 +31,8 @@ def _same(system: System) -> System:
 class ControllerPreset:
     """A controller by name: how it is made for a plant, and which of its gains are varied and tuned within which bounds.
 
-    Gains and bounds are the arm's; on another load `make` and `box_on` scale them (`control.scales`).
+    Gains and bounds are the arm's; on another load `make` and `box_on` scale them (`control.scales`), and on an arm whose amplifier or supply has
+    a limit the voltages among them.
     """
 
     on_arm: Callable[
@@ -72,7 +73,9 @@ class ControllerPreset:
         if lacking := self.missing(system):
             raise ValueError(f"no controller of a {type(system.load).__name__}: {lacking}.")
         controller = self.on_arm(system)
-        if not is_arm(system):
+        if is_arm(system):
+            controller = on_amplifier(controller, system, self.known)
+        else:
             controller = scaled(controller, factors_for(system, controller, self.scales), self.known)
         return set_parameters(controller, self.fixed) if self.fixed else controller
 
@@ -83,15 +86,22 @@ class ControllerPreset:
     def box_on(self, system: System) -> Box:
         """The bounds of its gains on a plant, to three digits, within those that make sense.
 
-        On another load than the arm they are `WIDER` on either side, since scales are rough; those of a command stay.
+        On another load than the arm they are `WIDER` on either side, since scales are rough; those of a command stay. On an arm whose amplifier
+        or supply has a limit those of a voltage keep their share of it.
         """
-        if is_arm(system):
+        limit = limited_as(system) if is_arm(system) else None
+        if is_arm(system) and limit is None:
             return self.box
         controller = self.on_arm(system)
-        factors, table = factors_for(system, controller, self.scales), parameters(controller)
+        table = parameters(controller)
+        volts = {name for name in self.box if table[name].unit == "V"}
+        if limit is None:
+            factors, apart = factors_for(system, controller, self.scales), WIDER
+        else:
+            factors, apart = {name: limit / ARM_LIMIT if name in volts else jnp.ones(()) for name in self.box}, 1.0
 
         def held(bound: float, name: str, wider: float) -> float:
-            scaled_bound = bound * float(factors[name]) * (1.0 if table[name].unit == "V" else wider)
+            scaled_bound = bound * float(factors[name]) * (1.0 if name in volts else wider)
             return min(max(float(f"{scaled_bound:.3g}"), table[name].low), table[name].high)
 
-        return {name: (held(low, name, 1.0 / WIDER), held(high, name, WIDER)) for name, (low, high) in self.box.items()}
+        return {name: (held(low, name, 1.0 / apart), held(high, name, apart)) for name, (low, high) in self.box.items()}
