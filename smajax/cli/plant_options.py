@@ -138,17 +138,20 @@ class PlantOptions:
 
         Raises typer.BadParameter for presets there are not, or some without the others; ExperimentError of --model.
         """
+        from smajax.control.model_as_plant import input_lag_left_out
         from smajax.report.loop_words import source_sentence
 
         system, of_runs = self._made(limit, True)
-        if of_runs is not None and said:
-            typer.echo(source_sentence(of_runs), err=True)
+        for source in (of_runs, *input_lag_left_out(self.kept)):
+            if source is not None and said:
+                typer.echo(source_sentence(source), err=True)
         return system
 
     def _made(self, limit: float | None, limited: bool) -> tuple[System, LimitOfFitRuns | None]:
         """(the plant; its limit where it is that of the model's runs)."""
         from smajax.control.compose import compose, with_values
         from smajax.control.model_as_plant import gives_limit, plant_of, with_limit
+        from smajax.model.extended import without_input_lag
         from smajax.model.rigs import arm
 
         named = {"--wire": self.wire, "--load": self.load, "--drive": self.drive}
@@ -160,9 +163,9 @@ class PlantOptions:
         changed = self._changed
         try:
             if self.kept is not None:
-                return (
-                    plant_of(self.kept, changed, limit) if limited else (with_values(self.kept.system, changed), None)
-                )
+                if limited:
+                    return plant_of(self.kept, changed, limit)
+                return without_input_lag(with_values(self.kept.system, changed)), None
             if missing:
                 system = with_values(arm(self.law) if self.law else arm(), changed)
             else:
@@ -244,9 +247,10 @@ class LoopPlants(PlantOptions):
 
         from smajax.control.model_as_plant import with_limit, within_limit
         from smajax.core.parameters import parameter_values, parameters, set_parameters
+        from smajax.model.extended import without_input_lag
 
         plants = self.kept.plants(wanted, seed)
-        plants = within_limit(self.kept, plants) if limit is None else with_limit(plants, limit)
+        plants = within_limit(self.kept, plants) if limit is None else with_limit(without_input_lag(plants), limit)
         if not self._changed:
             return plants
         own, changed = self.kept.values, parameter_values(self.system(limit, said=False))

@@ -11,10 +11,11 @@ import numpy as np
 from smajax.control.compose import with_values
 from smajax.control.loop_settings import LIMIT_PARAMETER
 from smajax.control.presets import CONTROLLERS
-from smajax.control.run_notes import LimitOfFitRuns, NoiseOfModelFile
+from smajax.control.run_notes import InputLagLeftOut, LimitOfFitRuns, NoiseOfModelFile
 from smajax.core.parameters import get_parameters, parameter_values, parameters, set_parameters
 from smajax.data.model_file.record import ModelRecord
-from smajax.model.extended import with_effects
+from smajax.model.effects.input_delay import InputDelay
+from smajax.model.extended import with_effects, without_input_lag
 from smajax.model.system import System
 
 
@@ -24,9 +25,10 @@ def plant_of(
     """(the model's system with the values in `changed`; the limit of its command, None where it is its own or was given).
 
     Where nobody gave the limit of a voltage amplifier it is a preset's, which no bench has: `limit` takes its place, in the command's
-    unit, or by default the largest command of the fit runs, since beyond it the model extrapolates. Other drives have no limit.
+    unit, or by default the largest command of the fit runs, since beyond it the model extrapolates. Other drives have no limit. Effects that
+    shift a recorded input in time are of the logs, and left out (`input_lag_left_out`).
     """
-    system = with_values(model.system, changed or {})
+    system = without_input_lag(with_values(model.system, changed or {}))
     if gives_limit(changed or {}):
         return system, None
     if limit is not None:
@@ -51,8 +53,16 @@ def with_limit(system: System, limit: float | None) -> System:
 
 
 def within_limit(model: ModelRecord, system: System) -> System:
-    """`system`, or a stack of systems, with the limit that `plant_of` gives the model."""
-    return with_limit(system, largest_fitted(model))
+    """`system`, or a stack of systems, with the limit that `plant_of` gives the model, and without what shifts a recorded input."""
+    return with_limit(without_input_lag(system), largest_fitted(model))
+
+
+def input_lag_left_out(model: ModelRecord | None) -> list[InputLagLeftOut]:
+    """The effects of a model file that shift the recorded input in time: a loop around the model is without them."""
+    if model is None:
+        return []
+    late = model.system.terms.input_lag
+    return [InputLagLeftOut(one.effect_name, float(one.delay) if isinstance(one, InputDelay) else None) for one in late]
 
 
 def largest_fitted(model: ModelRecord) -> float | None:
@@ -91,7 +101,7 @@ def true_plant(model: ModelRecord, changed: Mapping[str, str | float], assumed: 
 
 def _on_bench(model: ModelRecord, changed: Mapping[str, str | float], assumed: System) -> System:
     """The model's system with the limit of the assumed one. Raises as `true_plant`."""
-    plant = with_values(model.system, changed)
+    plant = with_values(without_input_lag(model.system), changed)
     for part in ("load", "drive"):
         own, other = (type(getattr(one, part)).__name__ for one in (assumed, plant))
         if own != other:
@@ -108,8 +118,9 @@ def one_plant(model: ModelRecord, assumed: System) -> dict[str, np.ndarray]:
 
     Raises ValueError as `true_plant`, and for a wire with another kinetics law.
     """
-    names = [one.effect_name for one in (*assumed.effects, *model.system.effects)]
-    plant, assumed = (with_effects(one, names) for one in (_on_bench(model, {}, assumed), assumed))
+    plant = _on_bench(model, {}, assumed)
+    names = [one.effect_name for one in (*assumed.effects, *plant.effects)]
+    plant, assumed = (with_effects(one, names) for one in (plant, assumed))
     kinds: list[Any] = [jax.tree.structure(one) for one in (plant, assumed)]
     if kinds[0] != kinds[1]:
         raise ValueError(

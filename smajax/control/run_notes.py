@@ -49,7 +49,15 @@ class GainsOfFile:
     own: LoopSettings = field(default_factory=LoopSettings)  # of the loop that runs
 
 
-Source: TypeAlias = LimitOfFitRuns | NoiseOfModelFile | PresetGains | GainsOfFile
+@dataclass(frozen=True)
+class InputLagLeftOut:
+    """An effect of a model file that shifts the recorded input in time, which no loop has."""
+
+    effect: str
+    delay: float | None = None  # s, as fitted; None of a clock that runs slow or fast
+
+
+Source: TypeAlias = LimitOfFitRuns | NoiseOfModelFile | PresetGains | GainsOfFile | InputLagLeftOut
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,14 @@ from smajax.control.figures_of_merit import SetPointMerit, merit_by_set_point, s
 from smajax.control.gains_file import Gains, read_gains
 from smajax.control.loop_dataset import labelled_loop
 from smajax.control.loop_settings import LoopInUse, LoopSettings, joined, settings_of
-from smajax.control.model_as_plant import gives_limit, noise_of_file, plant_of, true_plant, with_limit
+from smajax.control.model_as_plant import (
+    gives_limit,
+    input_lag_left_out,
+    noise_of_file,
+    plant_of,
+    true_plant,
+    with_limit,
+)
 from smajax.control.position_unit import PositionUnit, unit_of
 from smajax.control.presets import CONTROLLERS, check_controller
 from smajax.control.reach import reach_of, reach_sentence
@@ -50,6 +57,7 @@ from smajax.data.experiment.magnitude import MELTS
 from smajax.data.model_file.record import ModelRecord
 from smajax.data.text_input import clock_of, given, reads_file
 from smajax.model.channels import INPUT_UNITS, REPLACED
+from smajax.model.extended import without_input_lag
 from smajax.model.load.coupon import AbstractCoupon
 from smajax.model.system import System
 from smajax.simulation.dataset import simulate_dataset
@@ -251,7 +259,7 @@ class _Assumed(NamedTuple):
 
 def _assumed(request: RunRequest, loop: LoopRequest) -> _Assumed:
     """Raises as `run_open`, and GainsFileError."""
-    bare = request.system()
+    bare = request.system() if request.model is None else without_input_lag(request.system())
     gains = Gains(loop.controller, {}) if loop.gains is None else read_gains(loop.gains, bare)
     if gains.controller not in CONTROLLERS:
         raise ValueError(
@@ -273,7 +281,7 @@ def _assumed(request: RunRequest, loop: LoopRequest) -> _Assumed:
         if loop.gains is None
         else gains_of_files({gains.controller: (gains.loop, gains.fixed)}, loop.given, own)
     )
-    sources = limit, source, *of_gains
+    sources = limit, source, *input_lag_left_out(request.model), *of_gains
     return _Assumed(system, gains, merged, sensor, tuple(one for one in sources if one is not None))
 
 

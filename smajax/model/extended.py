@@ -18,6 +18,14 @@ def extended(system: System, effects: Sequence[str], coefficients: Mapping[str, 
     return set_parameters(dataclasses.replace(system, effects=at_base(effects)), dict(coefficients or {}))
 
 
+def without_input_lag(system: System) -> System:
+    """`system`, or a stack of systems, without the effects that shift a recorded input in time: they are of a log, and a closed loop has none."""
+    late = {one.effect_name for one in system.terms.input_lag}
+    if not late:
+        return system
+    return dataclasses.replace(system, effects=tuple(one for one in system.effects if one.effect_name not in late))
+
+
 def with_effects(system: System, names: Sequence[str]) -> System:
     """`system` with further effects at base value, all in the library's order; the values of those that it has stay."""
     there = [one.effect_name for one in system.effects]

@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
-from smajax.control.loop_settings import LIMIT_PARAMETER, LoopSettings
-from smajax.control.run_notes import GainsOfFile, LimitOfFitRuns, NoiseOfModelFile, PresetGains, Source
+from smajax.control.loop_settings import LIMIT_PARAMETER, PERIOD, LoopSettings
+from smajax.control.run_notes import (
+    GainsOfFile,
+    InputLagLeftOut,
+    LimitOfFitRuns,
+    NoiseOfModelFile,
+    PresetGains,
+    Source,
+)
 from smajax.core.display_units import digits, display
 from smajax.core.wording import and_listed, counted
 
@@ -79,9 +87,25 @@ def source_sentence(source: Source | None) -> str:
                 f"No gains file: the gains are those of the preset of {controller}{how}, and not tuned on this plant; `smajax tune {controller}` "
                 "tunes them, and --gains takes its gains.json."
             )
+        case InputLagLeftOut():
+            return _input_lag_sentence(source)
         case GainsOfFile():
             return _gains_sentence(source)
     return ""
+
+
+def _input_lag_sentence(source: InputLagLeftOut) -> str:
+    """What the model has of its logs and the loop has not, and the option for a command that is late on the bench too."""
+    if source.delay is None:
+        return f"The model's {source.effect} is of the clocks of its logs, and left out of the loop."
+    what = f"The model's {source.effect} of {digits(1e3 * source.delay, 3)} ms is of its logs, and left out of the loop"
+    if source.delay <= 0.0:
+        return f"{what}: below zero it is a clock of the logs, and no delay of the bench."
+    periods = max(1, math.ceil(source.delay / PERIOD - 1e-9))
+    return (
+        f"{what}. Where commands are late on the bench too, not only in the logs, give the loop its delay in control periods: --delay {periods} at "
+        f"{1e3 * PERIOD:g} ms each."
+    )
 
 
 def _gains_sentence(source: GainsOfFile) -> str:

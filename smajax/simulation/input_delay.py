@@ -18,8 +18,9 @@ def refuse_lag(system: System, what: str) -> None:
     """ValueError where an effect shifts the input in time, of which `what` knows no series."""
     for term in system.terms.input_lag:
         raise ValueError(
-            f"`{term.effect_name}` shifts a recorded input in time, but {what} makes its input as it goes: leave "
-            "the effect out, and give a closed loop its `delay`."
+            f"`{term.effect_name}` shifts a recorded input in time, but {what} makes its input as it goes: leave the effect's values out of --set "
+            "and --mismatch (of a system: `smajax.model.extended.without_input_lag`), and give a closed loop its delay in control periods "
+            "(--delay, `delay=`)."
         )
 
 

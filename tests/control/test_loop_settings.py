@@ -11,16 +11,18 @@ import numpy as np
 import pytest
 
 from smajax.cli.commands.sweep import loop_of
+from smajax.cli.plant_options import LoopPlants
 from smajax.control.gains_file import Gains, GainsFileError, read_gains
 from smajax.control.loop_settings import LoopInUse, LoopSettings, joined
-from smajax.control.model_as_plant import noise_of_file, plant_of
+from smajax.control.model_as_plant import noise_of_file, plant_of, within_limit
 from smajax.control.presets import CONTROLLERS
 from smajax.control.reach import reach_of
+from smajax.control.run_notes import InputLagLeftOut
 from smajax.control.run_request import LoopRequest, RunRequest, run_closed
 from smajax.control.run_result import RunResult
 from smajax.data.model_file.of_presets import model_of_presets
 from smajax.data.model_file.read import load_model
-from smajax.data.model_file.record import ModelOutput
+from smajax.data.model_file.record import ModelOutput, ModelParameter
 from smajax.report.loop_words import limit_words, source_sentence, source_sentences
 from smajax.report.note_words import note_sentences
 from smajax.report.simulate_page import settings_rows
@@ -245,3 +247,45 @@ def test_an_arm_is_led_and_tuned_with_the_limit_of_its_amplifier(tmp_path: Path)
     weak = RunRequest(model=kept, dt=0.01, seconds=0.1, values={"amplifier_limit": "14 V"})
     run = run_closed(weak, LoopRequest("", "40deg:0.1s", gains, noise=0.0))
     assert json.loads(run.data.attrs["gains"])["largest_voltage"] == 14.0
+
+
+def test_a_loop_around_a_model_is_without_the_delay_of_its_logs_and_says_the_option(tmp_path: Path) -> None:
+    """With a model of which a delay of the recorded input was fitted: the loop is that of the model without it."""
+    kept = kept_model(volts=7.0)
+    late = dataclasses.replace(
+        kept,
+        effects=("input_delay", "input_clock"),
+        likely=tuple(dataclasses.replace(one, effects=("input_delay", "input_clock")) for one in kept.likely),
+        parameters={
+            **kept.parameters,
+            "input_delay.delay": ModelParameter(0.0185, "fitted", -0.5, 2.0),
+            "input_clock.rate": ModelParameter(1e-4, "fitted", -0.05, 0.05),
+        },
+    )
+    request = LoopRequest("pid", "5mm:0.2s", noise=0.0)
+    own, without = (run_closed(RunRequest(model=one, dt=0.01), request) for one in (late, kept))
+    np.testing.assert_array_equal(own.data["position"], without.data["position"])
+    said = source_sentences(own.settings)
+    (delay,) = [one for one in said if "input_delay" in one]
+    assert delay.startswith(
+        "The model's input_delay of 18.5 ms is of its logs, and left out of the loop. Where commands"
+    )
+    assert delay.endswith("give the loop its delay in control periods: --delay 2 at 10 ms each.")
+    assert any(one.startswith("The model's input_clock is of the clocks of its logs") for one in said)
+    early = source_sentence(InputLagLeftOut("input_delay", -0.0185))
+    assert early.endswith(
+        "-18.5 ms is of its logs, and left out of the loop: below zero it is a clock of the logs, and no delay of the bench."
+    )
+    file = late.save(tmp_path / "late.toml")
+    options = LoopPlants(model=file, plant=late.save(tmp_path / "plant.toml"))
+    plants = options.plants(0, others=False)
+    assert isinstance(plants, dict)
+    assert not any("input_" in name for name in plants)
+    drawn = within_limit(late, late.plants(2))
+    assert drawn.effects == options.bare().effects == options.system().effects == ()
+    with pytest.raises(
+        ValueError, match=r"leave the effect's values out of --set and --mismatch .*\(--delay, `delay=`\)"
+    ):
+        run_closed(
+            RunRequest(model=kept, dt=0.01), dataclasses.replace(request, mismatch={"input_delay.delay": "20ms"})
+        )
