@@ -44,7 +44,8 @@ def _value(before: System, system: System, name: str, own: str, value: str | flo
 
     Text such as `+20%` is a change of the value that `before` has.
     """
-    unit = parameters(system)[own].unit
+    entry = parameters(system)[own]
+    unit = entry.unit
     if not isinstance(value, str):
         return float(value)
     ratio = ratio_of(name, value, plain=unit == "-" and name not in MISMATCHES)
@@ -67,7 +68,7 @@ def _value(before: System, system: System, name: str, own: str, value: str | flo
             )
         return plain
     try:
-        return parse_quantity(value, "1" if unit == "-" else unit)
+        return parse_quantity(value, "1" if unit == "-" else unit, also=entry.also)
     except UnitError as error:
         raise UnitError(f"{name}: {error}") from None
 

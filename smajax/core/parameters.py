@@ -23,13 +23,15 @@ def _as_float_array(value: Any) -> Any:
     return value if isinstance(value, jax.core.Tracer) else jnp.asarray(value, dtype=float)
 
 
-def parameter(unit: str, low: float, high: float, about: str, **kwargs: Any) -> Any:
+def parameter(unit: str, low: float, high: float, about: str, of_load: str = "", **kwargs: Any) -> Any:
     """A dataclass field for one physical parameter.
 
     `unit` is SI with temperatures in C; `low` and `high` are the widest values that make physical sense (the bounds
-    within which the simulator promises finite results); `about` is one line for tables and reports.
+    within which the simulator promises finite results); `about` is one line for tables and reports. `of_load`: what of the load it is measured
+    as, `reading`, `reading rate` or `force`; its unit in a system is then that of the system's load (`System.units_of_load`), and `unit`
+    that of a load whose position is a length.
     """
-    metadata = {"unit": unit, "low": low, "high": high, "about": about}
+    metadata = {"unit": unit, "low": low, "high": high, "about": about, "of_load": of_load}
     return eqx.field(converter=_as_float_array, metadata=metadata, **kwargs)
 
 
@@ -43,11 +45,16 @@ class Parameter:
     high: float
     about: str
     path: tuple[str | int, ...]
+    also: str = ""  # the unit of its field where the load has another: files of before give the same number in it
 
 
 def parameters(model: eqx.Module) -> dict[str, Parameter]:
-    """Every parameter of `model` by name. Effects (anything with an `effect_name`) prefix theirs: `latent_heat.enthalpy`."""
+    """Every parameter of `model` by name. Effects (anything with an `effect_name`) prefix theirs: `latent_heat.enthalpy`.
+
+    Their units are those of the model's load (rad and N m on an arm), where it has one.
+    """
     result: dict[str, Parameter] = {}
+    of_load: Mapping[str, str] = getattr(model, "units_of_load", {})
 
     def walk(node: Any, path: tuple[str | int, ...], prefix: str) -> None:
         if isinstance(node, (tuple, list)):
@@ -66,7 +73,9 @@ def parameters(model: eqx.Module) -> dict[str, Parameter]:
                         "every stage after this one knows parameters by name."
                     )
                 meta = entry.metadata
-                result[name] = Parameter(name, meta["unit"], meta["low"], meta["high"], meta["about"], here)
+                unit = of_load.get(meta["of_load"], meta["unit"])
+                also = meta["unit"] if unit != meta["unit"] else ""
+                result[name] = Parameter(name, unit, meta["low"], meta["high"], meta["about"], here, also)
             else:
                 walk(getattr(node, entry.name), here, prefix)
 

@@ -174,12 +174,13 @@ def convert(
 
 
 def parse_quantity(
-    value: str | float, expected: str, difference: bool = False, bare: str = "", offered: str = ""
+    value: str | float, expected: str, difference: bool = False, bare: str = "", offered: str = "", also: str = ""
 ) -> float:
     """The number that a quantity such as `"24.2 J/g"` is in the unit `expected` (`"J/kg"`: 24200.0).
 
     A bare number is in the unit `bare`; without one it is accepted only where the expected unit is "1": anything else
     must say its unit. offered: the unit that the message of one without puts behind it, in the place of `expected`.
+    also: a unit of another kind that is read as well, of which the number is taken (`Parameter.also`).
     `expected` "degC" reads "341 K" as the absolute 67.85; `expected` "K" is always a difference.
     Raises UnitError naming what was got, what was expected and what to do.
     """
@@ -206,7 +207,12 @@ def parse_quantity(
     if unit in _DIMENSIONLESS and expected not in _DIMENSIONLESS:
         like = offered or expected
         raise UnitError(f"got {value!r} without a unit, expected one like {like!r}; write '{number:g} {like}'")
-    shift = _shift(unit, expected, difference)
+    try:
+        shift = _shift(unit, expected, difference)
+    except UnitError:
+        if not also:
+            raise
+        return parse_quantity(value, also, difference)
     if shift is None or len(digits) > LONGEST:
         return float(convert(number, unit, expected, difference))
     # As if it were written in the unit expected: 0.31 mm is 0.00031 m, and not a bit beside it.

@@ -43,7 +43,7 @@ def describe(wire: str, load: str, drive: str, law: str = "") -> ModelDescriptio
     values = parameter_values(system)
     return ModelDescription(
         parameters={
-            entry.name: ParameterInfo(entry.unit, entry.low, entry.high, values.get(entry.name))
+            entry.name: ParameterInfo(entry.unit, entry.low, entry.high, values.get(entry.name), entry.also)
             for entry in parameters(whole).values()
         },
         inputs_required=system.load.inputs_required | system.drive.inputs_required,

@@ -38,6 +38,15 @@ class System(eqx.Module):
         check_effects(self.effects)
 
     @property
+    def units_of_load(self) -> dict[str, str]:
+        """Units (SI, rad) of what parameters of effects are measured as (`of_load` of `core.parameters.parameter`)."""
+        reading = self.load.reading[1]
+        result = {"reading": reading, "reading rate": "1/s" if reading == "-" else f"{reading}/s"}
+        if isinstance(self.load, AbstractMovingLoad):
+            result["force"] = "N m" if self.load.position_unit == "rad" else "N"
+        return result
+
+    @property
     def terms(self) -> Terms:
         """The effects by the equation that they change. By their types, at the cost of a few microseconds; no leaf of its own."""
         return grouped(self.effects)

@@ -17,13 +17,14 @@ WIRE_SIZES = ("wire_length", "wire_diameter")  # what a ruler tells of the wire;
 class ParameterInfo:
     """Unit of a parameter (the program's own: SI, degC, rad) and the widest values that make physical sense.
 
-    preset: what the presets have for it; None of an effect, whose base value says only that it is not there.
+    preset: what the presets have for it; None of an effect, whose base value says only that it is not there. also: as `Parameter.also`.
     """
 
     unit: str
     low: float
     high: float
     preset: float | None = None
+    also: str = ""
 
 
 @dataclass(frozen=True)

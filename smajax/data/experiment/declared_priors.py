@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from smajax.core.names import close_matches, of_many
@@ -38,7 +39,9 @@ def declared_priors(
             if name not in known:
                 near = close_matches(name, [*known, "odds"], "known here")
                 raise ExperimentError(path, f"{key}.{name}", f"{effect!r} has no coefficient {name!r}{near}")
-            coefficients[f"{effect}.{name}"] = _coefficient(path, f"{key}.{name}", one, known[name])
+            info, here = known[name], model.parameters.get(f"{effect}.{name}")
+            info = info if here is None else replace(info, unit=here.unit, also=here.also)  # as on this load
+            coefficients[f"{effect}.{name}"] = _coefficient(path, f"{key}.{name}", one, info)
     presets = _presets(path, file, model, kept.values if kept else {})
     return DeclaredPriors(odds, coefficients, presets), _not_tried(file, model, tuple(sections))
 
@@ -97,7 +100,7 @@ def _spread(path: Path, key: str, section: SpreadSection, info: ParameterInfo) -
         return section.relative, True
     where = f"{key}.width"
     with at_key(path, where):
-        width = parse_quantity(section.width or 0.0, info.unit, difference=True)
+        width = parse_quantity(section.width or 0.0, info.unit, difference=True, also=info.also)
     if width <= 0.0:
         raise ExperimentError(path, where, f"got {section.width!r}, expected a standard deviation above zero")
     most = 0.5 * (info.high - info.low)

@@ -31,7 +31,7 @@ def bounded(path: Path, key: str, value: Quantity, info: ParameterInfo) -> float
             f"got {value!r} without a unit; expected {info.low:g} to {info.high:g} {info.unit}, written like {like!r}",
         )
     with at_key(path, key):
-        number = parse_quantity(value, info.unit, offered=meant or "")
+        number = parse_quantity(value, info.unit, offered=meant or "", also=info.also)
     if not info.low <= number <= info.high:
         raise ExperimentError(
             path,
@@ -97,7 +97,7 @@ def _prior(path: Path, key: str, section: PriorSection, info: ParameterInfo, low
             )
         return Prior(mean, section.log_sigma, True)
     with at_key(path, f"{key}.sigma"):
-        sigma = parse_quantity(section.sigma or 0.0, info.unit, difference=True)
+        sigma = parse_quantity(section.sigma or 0.0, info.unit, difference=True, also=info.also)
     if sigma <= 0.0:
         raise ExperimentError(path, f"{key}.sigma", f"got {section.sigma!r}, expected a standard deviation above zero")
     return Prior(mean, sigma, False)

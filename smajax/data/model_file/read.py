@@ -105,7 +105,10 @@ def _model(path: Path, file: ModelFile) -> ActuatorModel:
         check_together(system, part.load, part.drive)
     except ValueError as error:
         raise ExperimentError(path, "model", str(error)) from error
-    table = {entry.name: ParameterInfo(entry.unit, entry.low, entry.high) for entry in parameters(system).values()}
+    table = {
+        entry.name: ParameterInfo(entry.unit, entry.low, entry.high, also=entry.also)
+        for entry in parameters(system).values()
+    }
     presets = f"{part.wire} {part.load} {part.drive}"
     for name in file.parameters:
         _check_parameter(path, name, table, presets, part.effects)
@@ -160,7 +163,7 @@ def _parameter(path: Path, name: str, given: ParameterSection, info: ParameterIn
     error = None
     if given.standard_error is not None:
         with at_key(path, f"{key}.standard_error"):
-            error = parse_quantity(given.standard_error, info.unit, difference=True)
+            error = parse_quantity(given.standard_error, info.unit, difference=True, also=info.also)
         if error < 0.0:
             raise ExperimentError(path, f"{key}.standard_error", f"got {given.standard_error!r}, expected zero or more")
     return ModelParameter(bounded(path, key, given.value, info), given.origin, low, high, error)

@@ -28,7 +28,9 @@ def presliding_parameter() -> Scalar:
 class CoulombFriction(AbstractEffect, FrictionTerm):
     r"""$F_c\,\mathrm{sign}(\dot x)$ against the motion, built up over a small presliding displacement (Dahl 1968)."""
 
-    limit: Scalar = parameter("N", 0.0, 20.0, "F_c: friction force while sliding (N m on an arm)", default=0.0)
+    limit: Scalar = parameter(
+        "N", 0.0, 20.0, "F_c: friction force while sliding (N m on an arm)", of_load="force", default=0.0
+    )
     bend: Scalar = presliding_parameter()
 
     effect_name: ClassVar[str] = "coulomb_friction"

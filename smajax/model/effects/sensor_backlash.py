@@ -29,7 +29,9 @@ def _start_ranges(switches: Mapping[str, float]) -> dict[str, tuple[float, float
 class SensorBacklash(AbstractEffect, SensorTerm):
     r"""$y \to \min(\max(y, x - b), x + b)$, the play operator: y stays until x is b away from it."""
 
-    half_width: Scalar = parameter("m", 0.0, 10.0, "b: half of the play (rad on an arm, - for a strain)", default=0.0)
+    half_width: Scalar = parameter(
+        "m", 0.0, 10.0, "b: half of the play (rad on an arm, - for a strain)", of_load="reading", default=0.0
+    )
 
     effect_name: ClassVar[str] = "sensor_backlash"
     candidate: ClassVar[Candidate] = Candidate(

@@ -20,7 +20,12 @@ class SensorDrift(AbstractEffect, SensorTerm):
     r"""$y = x + a t$ from the start of each run."""
 
     rate: Scalar = parameter(
-        "m/s", -10.0, 10.0, "a: drift of the reading (rad/s on an arm, 1/s for a strain)", default=0.0
+        "m/s",
+        -10.0,
+        10.0,
+        "a: drift of the reading (rad/s on an arm, 1/s for a strain)",
+        of_load="reading rate",
+        default=0.0,
     )
 
     effect_name: ClassVar[str] = "sensor_drift"

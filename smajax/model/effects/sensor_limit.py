@@ -44,11 +44,15 @@ class SensorLimit(AbstractEffect, SensorTerm):
     upper_cut: Scalar = parameter(
         "-", 0.0, 1.0, "s_u: share of the motion above the upper limit that is lost", default=0.0
     )
-    upper: Scalar = parameter("m", -10.0, 10.0, "y_u: upper limit (rad on an arm, - for a strain)", default=10.0)
+    upper: Scalar = parameter(
+        "m", -10.0, 10.0, "y_u: upper limit (rad on an arm, - for a strain)", of_load="reading", default=10.0
+    )
     lower_cut: Scalar = parameter(
         "-", 0.0, 1.0, "s_l: share of the motion below the lower limit that is lost", default=0.0
     )
-    lower: Scalar = parameter("m", -10.0, 10.0, "y_l: lower limit (rad on an arm, - for a strain)", default=-10.0)
+    lower: Scalar = parameter(
+        "m", -10.0, 10.0, "y_l: lower limit (rad on an arm, - for a strain)", of_load="reading", default=-10.0
+    )
 
     effect_name: ClassVar[str] = "sensor_limit"
     candidate: ClassVar[Candidate] = Candidate(

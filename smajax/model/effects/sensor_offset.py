@@ -18,7 +18,9 @@ def _bounds(extent: Extent) -> dict[str, tuple[float, float]]:
 class SensorOffset(AbstractEffect, SensorTerm):
     r"""$y = x + a$; nothing new where the experiment lets every run have its own zero."""
 
-    shift: Scalar = parameter("m", -10.0, 10.0, "a: zero of the sensor (rad on an arm, - for a strain)", default=0.0)
+    shift: Scalar = parameter(
+        "m", -10.0, 10.0, "a: zero of the sensor (rad on an arm, - for a strain)", of_load="reading", default=0.0
+    )
 
     effect_name: ClassVar[str] = "sensor_offset"
     candidate: ClassVar[Candidate] = Candidate(

@@ -35,9 +35,16 @@ class SensorResolution(AbstractEffect, SensorTerm):
 
     share: Scalar = parameter("-", 0.0, 1.0, "s: share of the staircase in the reading", default=0.0)
     increment: Scalar = parameter(
-        "m", 1e-7, 0.5, "q: from one reading to the next (rad on an arm, - for a strain)", default=0.001
+        "m",
+        1e-7,
+        0.5,
+        "q: from one reading to the next (rad on an arm, - for a strain)",
+        of_load="reading",
+        default=0.001,
     )
-    zero: Scalar = parameter("m", -0.5, 0.5, "z: one of the readings (rad on an arm, - for a strain)", default=0.0)
+    zero: Scalar = parameter(
+        "m", -0.5, 0.5, "z: one of the readings (rad on an arm, - for a strain)", of_load="reading", default=0.0
+    )
 
     effect_name: ClassVar[str] = "sensor_resolution"
     candidate: ClassVar[Candidate] = Candidate(

@@ -50,7 +50,9 @@ class StribeckFriction(AbstractEffect, FrictionTerm):
     moves faster than v_s, it is `CoulombFriction`. How wide the loop of a slow run is tells F_s, that of a fast one r; v_s takes runs of several speeds.
     """
 
-    limit: Scalar = parameter("N", 0.0, 20.0, "F_s: friction at rest, to break away (N m on an arm)", default=0.0)
+    limit: Scalar = parameter(
+        "N", 0.0, 20.0, "F_s: friction at rest, to break away (N m on an arm)", of_load="force", default=0.0
+    )
     sliding: Scalar = parameter("-", 0.01, 1.0, "r = F_c/F_s: friction in motion over that at rest", default=0.5)
     speed: Scalar = parameter(
         "m/s", 1e-5, 1.0, "v_s: speed of the wire's moving end about which it falls from F_s to F_c", default=0.005
