@@ -60,7 +60,7 @@ def test_an_implausible_channel_is_a_warning(bench: Path) -> None:
         ("the output 'position' is constant", {"position": np.zeros(500)}),
         ("runs into its highest value and stays exactly there", {"position": np.minimum(swing, 7.0)}),
         ("runs into its lowest value and stays exactly there", {"position": np.maximum(swing, -7.0)}),
-        ("increment of 0.0005 m is larger than its noise of 1e-05 m", {"position": 0.5 * np.round(swing / 0.5)}),
+        ("increment of 0.5 mm is larger than its noise of 0.01 mm", {"position": 0.5 * np.round(swing / 0.5)}),
         ("only 10 samples", {"count": 50}),
     ]
     for words, change in cases:

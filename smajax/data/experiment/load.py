@@ -172,11 +172,11 @@ def _output(path: Path, file: ExperimentFile, name: str, unit: str, runs: Sequen
             )
         readings = np.concatenate([read.signals[name].measured for read in fit])
         if sensor < FINEST * float(np.abs(readings).max()) or 0.0 < COARSEST * float(np.ptp(readings)) < sensor:
+            low, high = (fit[0].signals[name].as_logged(one) for one in (readings.min(), readings.max()))
             raise ExperimentError(
                 path,
                 key,
-                f"got {given!r}, and the readings go from {readings.min():.4g} to {readings.max():.4g} {unit}".rstrip()
-                + f": no sensor has that noise there; expected one like '{example}', or '{ESTIMATE}'",
+                f"got {given!r}, and the readings go from {low} to {high}: no sensor has that noise there; expected one like '{example}', or '{ESTIMATE}'",
             )
         how = f"given as {given}" + (f", times {gain:.3g} for the average over a step" if gain < 1.0 else "")
         return Output(name, unit, sensor * gain, how, True, offset, sensor if gain < 1.0 else None), sensor
@@ -366,5 +366,5 @@ def _log_warnings(
         warnings += heading_warnings(*own_columns(reading.path, run, file.channels, file.time), run)
     warnings += constant_warnings(runs)
     for output, sensor_sigma in outputs:
-        warnings += quantum_warning(_of_fit(runs), output.name, sensor_sigma, output.unit)
+        warnings += quantum_warning(_of_fit(runs), output.name, sensor_sigma)
     return warnings + copy_warnings(runs) + common_warnings(runs)

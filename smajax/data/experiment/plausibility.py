@@ -158,14 +158,15 @@ def constant_warnings(runs: Sequence[ReadRun]) -> list[str]:
     return [f"the input {name!r} never changes in any run; is it the right column?" for name in still]
 
 
-def quantum_warning(runs: Sequence[ReadRun], name: str, sensor_noise: float, unit: str) -> list[str]:
-    """Whether the sensor's increment exceeds its noise, both before resampling and in the output's own unit."""
+def quantum_warning(runs: Sequence[ReadRun], name: str, sensor_noise: float) -> list[str]:
+    """Whether the sensor's increment exceeds its noise, both before resampling and in the program's unit; the sentence has the log's."""
     quantum = float(np.median([read.quantum[name] for read in runs]))
     if quantum <= sensor_noise:
         return []
     whose = "the output's" if len(runs[0].run.outputs) == 1 else f"{name!r}'s"
+    increment, noise = (runs[0].signals[name].as_logged(one, difference=True) for one in (quantum, sensor_noise))
     return [
-        f"{whose} increment of {quantum:.4g} {unit} is larger than its noise of {sensor_noise:.4g} {unit} at the "
+        f"{whose} increment of {increment} is larger than its noise of {noise} at the "
         "sensor's rate; residuals of that size are rounding"
     ]
 

@@ -30,17 +30,27 @@ MOST_SAMPLES = 2_000_000
 class Signal:
     """One channel as measured, in the program's own unit: time and values, both (n,); nan where one is missing.
 
-    repeated: how many samples at a time that another one has were taken out.
+    repeated: how many samples at a time that another one has were taken out. unit: the log's own, which sentences about the log have; own: the
+    program's.
     """
 
     time: Array
     values: Array
     repeated: int = 0
+    unit: str = ""
+    own: str = ""
 
     @property
     def measured(self) -> Array:
         """The values that are there."""
         return self.values[np.isfinite(self.values)]
+
+    def as_logged(self, value: float, difference: bool = False) -> str:
+        """A value in the program's unit, in the log's: `0.1 deg`."""
+        if not self.unit:
+            return f"{value:.4g}"
+        shown = "" if self.unit in ("-", "1") else self.unit
+        return f"{float(convert(value, self.own, self.unit, difference)):.4g} {shown}".rstrip()
 
 
 @dataclass(frozen=True)
@@ -169,7 +179,7 @@ def _signal(
         if how == "refuse" and time is not None and np.all(np.diff(clock) >= 0.0) and clock.size > 1:
             raise MeasuredDataError(f"{error}; or write repeated = 'mean' (or 'last') under [time]") from None
         raise
-    return Signal(time=convert(clock, unit, "s"), values=values, repeated=repeated)
+    return Signal(convert(clock, unit, "s"), values, repeated, channel.unit, own_unit)
 
 
 def _taken(reading: Reading, name: str) -> frozenset[str | int]:
