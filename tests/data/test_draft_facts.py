@@ -15,6 +15,7 @@ from smajax.data.experiment.draft import Draft, draft
 from smajax.data.experiment.draft_facts import BenchFacts
 from smajax.data.experiment.draft_model import ModelChoice
 from smajax.data.experiment.errors import ExperimentError
+from smajax.data.experiment.extend import extended
 from smajax.data.experiment.load import load_experiment
 from smajax.data.experiment.name_hints import hinted, mass_hint
 from smajax.data.model_catalogue import CATALOGUE
@@ -207,6 +208,33 @@ def test_a_load_without_a_hanging_mass_takes_none(tmp_path: Path) -> None:
         drafted(tmp_path, load="bias_spring", masses={"a": "500 g", "b": "500 g"})
     with pytest.raises(ExperimentError, match="flexinol_ht_500um bias_spring voltage takes no mass of each run"):
         drafted(tmp_path, load="bias_spring", mass="500 g")
+
+
+def test_on_an_arm_the_mass_of_a_run_is_its_payload(tmp_path: Path) -> None:
+    files = logs(tmp_path, "a", "b", "c")
+    for file in files:
+        file.write_text(file.read_text().replace("x [mm]", "angle [deg]"), encoding="utf-8")
+
+    def on_arm(**facts: Any) -> str:
+        return draft(files[:2], tmp_path / "e.toml", choice=ModelChoice("arm"), bench=BenchFacts(**facts)).text
+
+    text = on_arm(mass="60 g", masses={"b": "45 g"})
+    (tmp_path / "e.toml").write_text(text, encoding="utf-8")
+    experiment = load_experiment(tmp_path / "e.toml", CATALOGUE)
+    assert experiment.parameters["payload_mass"] == 0.06
+    assert [dict(run.parameters) for run in experiment.runs] == [{}, {"payload_mass": 0.045}]
+    assert 'parameters = { payload_mass = "45 g" }' in text
+    assert "# payload_mass = " not in text
+    assert on_arm(known={"payload_mass": "60 g"}, masses={"b": "45 g"}) == text
+    with pytest.raises(ExperimentError, match=r"runs\.a\.parameters\.payload_mass: is missing: 'b' has a mass; give"):
+        on_arm(masses={"b": "45 g"})
+    with pytest.raises(ExperimentError, match=r"model\.parameters\.payload_mass: got it and a mass of every run"):
+        on_arm(mass="45 g", known={"payload_mass": "60 g"})
+    with pytest.raises(ExperimentError, match="'45' without a unit, expected one like 'g'; write '45 g'"):
+        on_arm(masses={"a": "45", "b": "45 g"})
+    further = extended(tmp_path / "e.toml", [files[2]], tmp_path / "more.toml", {"c": "75 g"})
+    (tmp_path / "more.toml").write_text(further.text, encoding="utf-8")
+    assert load_experiment(tmp_path / "more.toml", CATALOGUE).runs[-1].parameters == {"payload_mass": 0.075}
 
 
 def test_a_log_with_a_mass_takes_no_other(tmp_path: Path) -> None:

@@ -132,15 +132,16 @@ def _beside_the_values(project: Project, said: Mapping[str, str], head: str) -> 
     file = project.file
     if file is None or head not in project.text:
         return
-    from smajax.data.experiment.draft_facts import Known
+    from smajax.data.experiment.draft_facts import PAYLOAD, Known
     from smajax.data.experiment.draft_model import DraftModel
     from smajax.data.experiment.draft_parameters import ordered, preset_parameters
 
     model = file.model
     inputs = tuple(name for name, one in file.channels.items() if one.role == "input")
     masses = {run.name: str(run.inputs["mass"]) for run in file.runs if "mass" in run.inputs}
+    payloads = {run.name: str(run.parameters[PAYLOAD]) for run in file.runs if PAYLOAD in run.parameters}
     likely = {name: (base, 0.0) for name, base in file.priors.bases.items()}
-    known = Known({name: str(value) for name, value in model.parameters.items()}, likely, masses=masses)
+    known = Known({name: str(value) for name, value in model.parameters.items()}, likely, masses=masses, payloads=payloads)
     drafted = preset_parameters(DraftModel(model.wire, model.load, model.drive, inputs, "", ""), known)
     text = ordered(project.text, drafted.presets, said)
     if text != project.text:

@@ -62,7 +62,7 @@ def new_experiment(
         list[str] | None,
         typer.Option(
             "--mass",
-            help="hanging mass where no column has it: '500 g' of all runs, RUN='1 kg' of one; may be repeated",
+            help="hanging mass, of an arm its payload, where no column has it: '500 g' of all runs, RUN='1 kg' of one; may be repeated",
         ),
     ] = None,
     runs_of: Annotated[

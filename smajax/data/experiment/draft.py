@@ -22,7 +22,7 @@ from smajax.data.experiment.column_guess import (
     times_not_read,
 )
 from smajax.data.experiment.draft_channels import channel_lines, override_lines
-from smajax.data.experiment.draft_facts import BenchFacts, Known, diameter_of, facts_of
+from smajax.data.experiment.draft_facts import PAYLOAD, BenchFacts, Known, diameter_of, facts_of
 from smajax.data.experiment.draft_model import DraftModel, ModelChoice, choose_model, wire_messages
 from smajax.data.experiment.draft_parameters import PresetLine, kept_parameters, ordered, preset_parameters
 from smajax.data.experiment.first_force import first_force
@@ -349,7 +349,7 @@ def _runs(inputs: _Inputs, target: Path) -> _Section:
     base = (target.resolve().parent / _folder(inputs.files, target)).resolve()
     channels = {*model.inputs, model.output}
     lines: list[str] = []
-    forces, masses = inputs.first_forces, inputs.known.masses
+    forces, masses, payloads = inputs.first_forces, inputs.known.masses, inputs.known.payloads
     for run in runs:
         role = "held-out" if run is held_out else "fit"
         names = [toml_value(file.resolve().relative_to(base).as_posix()) for file in run.files]
@@ -370,6 +370,7 @@ def _runs(inputs: _Inputs, target: Path) -> _Section:
                 else []
             ),
             *([f"inputs = {{ mass = {toml_value(masses[run.name])} }}"] if masses else []),
+            *([f"parameters = {{ {PAYLOAD} = {toml_value(payloads[run.name])} }}"] if run.name in payloads else []),
             f"file = {names[0]}" if len(names) == 1 else f"files = {{ {by_channel} }}",
             *override_lines(
                 {name: one for name, one in overrides.items() if name in {TIME, *channels}}, inputs.columns

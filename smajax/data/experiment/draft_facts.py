@@ -22,6 +22,7 @@ from smajax.data.model_file.actuator_model import ActuatorModel
 PHASES = ("resistivity_martensite", "resistivity_austenite")
 # By how much their ratio may differ from the preset's: data sheets of NiTi have 76 and 82, and 80 and 100 uohm cm.
 HOT_RESISTIVITY = 0.1
+PAYLOAD = "payload_mass"  # the parameter of a load that has the mass of a run, and no channel of it
 
 
 @dataclass(frozen=True)
@@ -42,13 +43,15 @@ class BenchFacts:
 class Known:
     """Checked: values with their units by parameter, where those that were computed come from, masses by run; and messages.
 
-    likely: values about which a prior lies, since nobody measured them on this wire, with how far they may be off (relative).
+    likely: values about which a prior lies, since nobody measured them on this wire, with how far they may be off (relative). payloads: masses
+    by run of a load that has them as its parameter `payload_mass`; of the other runs it is among the values.
     """
 
     values: Mapping[str, str] = field(default_factory=dict)
     likely: Mapping[str, tuple[str, float]] = field(default_factory=dict)
     origins: Mapping[str, str] = field(default_factory=dict)
     masses: Mapping[str, str] = field(default_factory=dict)
+    payloads: Mapping[str, str] = field(default_factory=dict)
     messages: tuple[str, ...] = ()
 
 
@@ -109,7 +112,11 @@ def checked(
             f"{hot_name} = {found[hot_name]} within {100 * HOT_RESISTIVITY:g} %: {hot}; a fit may correct it"
         )
     masses = _masses(facts, path, presets, model, runs)
-    return Known(values, likely, origins, masses, tuple(messages))
+    if not masses or "mass" in model.inputs_optional:
+        return Known(values, likely, origins, masses, messages=tuple(messages))
+    values |= {PAYLOAD: facts.mass} if facts.mass else {}
+    payloads = {run: value for run, value in masses.items() if run in facts.masses}
+    return Known(values, likely, origins, payloads=payloads, messages=tuple(messages))
 
 
 def _resistivities(
@@ -156,35 +163,37 @@ def _masses(
     if not facts.masses and not facts.mass:
         return {}
     first = next(iter(facts.masses), runs[0])
-    if "mass" not in model.inputs_optional:
+    channel = "mass" in model.inputs_optional
+    if not channel and PAYLOAD not in model.parameters:
         raise ExperimentError(
             path,
             f"runs.{first}.inputs.mass",
-            f"the model of {presets} takes no mass of each run (a dead_weight does); give a parameter of it with --known, "
-            f"`smajax presets {presets}` lists them",
+            f"the model of {presets} takes no mass of each run (a dead_weight does); give a parameter of it with --known for all runs, or "
+            f"under [[runs]] as parameters = {{ NAME = '...' }} for one; `smajax presets {presets}` lists them",
         )
-    if facts.mass and "load_mass" in facts.known:
+    own, place = ("load_mass", "inputs.mass") if channel else (PAYLOAD, f"parameters.{PAYLOAD}")
+    if facts.mass and own in facts.known:
         raise ExperimentError(
-            path, "model.parameters.load_mass", "got it and a mass of every run, which say the same; give one of them"
+            path, f"model.parameters.{own}", "got it and a mass of every run, which say the same; give one of them"
         )
     unknown = [run for run in facts.masses if run not in runs]
     if unknown:
         near = close_matches(unknown[0], runs, "there are")
-        raise ExperimentError(path, f"runs.{unknown[0]}.inputs.mass", f"there is no run {unknown[0]!r}{near}")
+        raise ExperimentError(path, f"runs.{unknown[0]}.{place}", f"there is no run {unknown[0]!r}{near}")
     for run, value in {**(dict.fromkeys(runs, facts.mass) if facts.mass else {}), **facts.masses}.items():
-        key = f"runs.{run}.inputs.mass"
+        key = f"runs.{run}.{place}"
         try:
-            number = parse_mass(value)
+            number = parse_mass(value) if channel else bounded(path, key, value, model.parameters[own])
         except UnitError as error:
             raise ExperimentError(path, key, str(error)) from None
-        if not number > 0.0:
+        if channel and not number > 0.0:
             raise ExperimentError(path, key, f"got {value!r}; expected more than 0 kg")
-    others = facts.mass or facts.known.get("load_mass", "")
+    others = facts.mass or facts.known.get(own, "")
     missing = [run for run in runs if run not in facts.masses]
     if missing and not others:
         raise ExperimentError(
             path,
-            f"runs.{missing[0]}.inputs.mass",
+            f"runs.{missing[0]}.{place}",
             f"is missing: {and_listed([repr(run) for run in facts.masses])} {'has' if len(facts.masses) == 1 else 'have'} a mass; give "
             f"--mass {missing[0]}=... too, or one --mass without a name for all the others",
         )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from smajax.core.parameters import parameter_values, parameters
 from smajax.data.experiment.catalogue import WIRE_SIZES
-from smajax.data.experiment.draft_facts import Known
+from smajax.data.experiment.draft_facts import PAYLOAD, Known
 from smajax.data.experiment.draft_model import DraftModel
 from smajax.data.experiment.toml_file import quantity, toml_key, toml_value
 from smajax.data.model_file.actuator_model import ActuatorModel
@@ -88,6 +88,7 @@ def _preset_lines(model: DraftModel, system: System, known: Known, unknown: Sequ
     out = {*known.values, *known.likely, *unknown} | (
         {"load_mass"} if "mass" in model.inputs or known.masses else set()
     )
+    out |= {PAYLOAD} if known.payloads else set()
     sizes = [*WIRE_SIZES, *["ambient_temperature"] * heated] if model.load != "coupon" else []
     parts = [name for name, one in table.items() if one.path[0] in ("load", "drive")]
     rest = [name for name, one in table.items() if one.path[0] == "wire" and name not in sizes]

@@ -9,9 +9,12 @@ from smajax.core.wording import and_listed
 from smajax.data.experiment.bench_mass import parse_mass
 from smajax.data.experiment.data_folder import data_folder
 from smajax.data.experiment.draft import Draft
+from smajax.data.experiment.draft_facts import PAYLOAD
 from smajax.data.experiment.errors import ExperimentError, at_key
-from smajax.data.experiment.schema import read_schema
+from smajax.data.experiment.from_model_file import with_model_file
+from smajax.data.experiment.schema import ExperimentFile, read_schema
 from smajax.data.experiment.toml_file import toml_value
+from smajax.data.model_catalogue import describe
 
 
 def extended(
@@ -29,6 +32,7 @@ def extended(
             target, "", f"is in another folder than {path}, whose paths begin there; give --out {beside} or so"
         )
     folder = data_folder(path, old.data.folder).resolve()
+    payload = (masses or mass) and _has_payload(path, old)
     own, taken = dict(masses or {}), {run.name for run in old.runs}
     files = {
         (folder / one).resolve(): run.name for run in old.runs for one in (run.file, *(run.files or {}).values()) if one
@@ -56,12 +60,24 @@ def extended(
         weight = own.pop(name, mass)
         lines += ["", "[[runs]]", f"name = {toml_value(name)}", 'role = "fit"']
         if weight:
-            with at_key(target, f"runs.{name}.inputs.mass"):
+            with at_key(target, f"runs.{name}.{f'parameters.{PAYLOAD}' if payload else 'inputs.mass'}"):
                 parse_mass(weight)
-            lines.append(f"inputs = {{ mass = {toml_value(weight)} }}")
+            table, key = ("parameters", PAYLOAD) if payload else ("inputs", "mass")
+            lines.append(f"{table} = {{ {key} = {toml_value(weight)} }}")
         lines.append(f"file = {toml_value(log.resolve().relative_to(folder).as_posix())}")
     if own:
         raise ExperimentError(target, f"runs.{next(iter(own))}.inputs.mass", "there is no such log among the new ones")
     kept = and_listed([run.name for run in old.runs])
     message = f"runs: those of {path.name} ({kept}), and fit runs of {and_listed([log.name for log in logs])}, with its columns"
     return Draft("\n".join([text, *lines, ""]), (message,))
+
+
+def _has_payload(path: Path, file: ExperimentFile) -> bool:
+    """Whether the mass of a run is a parameter of the experiment's load, and no channel. Raises ExperimentError."""
+    whole, _ = with_model_file(path, file)
+    model = whole.model
+    try:
+        described = describe(model.wire, model.load, model.drive, model.law)
+    except (KeyError, ValueError):
+        return False  # what is wrong is said when the file is loaded
+    return "mass" not in described.inputs_optional and PAYLOAD in described.parameters
