@@ -174,7 +174,7 @@ def limited_as(system: System) -> Scalar | None:
     """The largest command of an arm's amplifier or supply, V, where it is known; None where the limits of the presets hold."""
     limit = system.drive.largest_command()
     at_wire = get_parameters(system, ["amplifier_limit"])[0] if "amplifier_limit" in parameters(system) else limit
-    return limit if at_wire < NO_LIMIT else None
+    return jnp.asarray(limit) if at_wire < NO_LIMIT else None
 
 
 def on_amplifier(controller: Module, system: System, own: frozenset[str]) -> Module:

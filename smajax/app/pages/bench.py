@@ -141,7 +141,9 @@ def _beside_the_values(project: Project, said: Mapping[str, str], head: str) -> 
     masses = {run.name: str(run.inputs["mass"]) for run in file.runs if "mass" in run.inputs}
     payloads = {run.name: str(run.parameters[PAYLOAD]) for run in file.runs if PAYLOAD in run.parameters}
     likely = {name: (base, 0.0) for name, base in file.priors.bases.items()}
-    known = Known({name: str(value) for name, value in model.parameters.items()}, likely, masses=masses, payloads=payloads)
+    known = Known(
+        {name: str(value) for name, value in model.parameters.items()}, likely, masses=masses, payloads=payloads
+    )
     drafted = preset_parameters(DraftModel(model.wire, model.load, model.drive, inputs, "", ""), known)
     text = ordered(project.text, drafted.presets, said)
     if text != project.text:
