@@ -6,6 +6,7 @@ import dataclasses
 import json
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -244,6 +245,14 @@ def test_an_arm_is_led_and_tuned_with_the_limit_of_its_amplifier(tmp_path: Path)
     said = refused(*tune, "--start", gains, "--set", "amplifier_limit=7V", "--out", tmp_path / "out")
     assert "with up to 7 V" in said  # --set goes first
     assert "(--set amplifier_limit=...)" in said
+    # Of the default set points, which nobody typed, those out of reach are left out.
+    with patch("smajax.control.tune.tuning_folder.tune_in_folder", side_effect=ValueError("tuning")) as begun:
+        said = refused(*tune[:4], "--set", "amplifier_limit=13V", "--out", tmp_path / "out")
+    assert "Of the default set points" in said
+    assert "20, 40, 60, 85 deg are left out: with up to 13 V this load comes to rest between -45 and" in said
+    points = begun.call_args.args[1].set_points
+    assert points == (-40.0, -20.0, 0.0, 20.0, 40.0, 60.0, 85.0)[: len(points)]
+    assert 0 < len(points) < 7
     weak = RunRequest(model=kept, dt=0.01, seconds=0.1, values={"amplifier_limit": "14 V"})
     run = run_closed(weak, LoopRequest("", "40deg:0.1s", gains, noise=0.0))
     assert json.loads(run.data.attrs["gains"])["largest_voltage"] == 14.0

@@ -106,12 +106,16 @@ def _run(
     overwrite: bool,
     json_out: bool,
     words: PlantWords,
+    typed: bool,
 ) -> Mapping[str, Any]:
-    """The record of the tuning, from the folder where it is finished there. Raises typer.BadParameter."""
+    """The record of the tuning, from the folder where it is finished there. Raises typer.BadParameter.
+
+    typed: whether somebody gave the set points; of the default ones those out of reach are left out, which stderr says.
+    """
     from smajax.cli.progress_display import displayed
     from smajax.cli.result_folder import FolderTaken, claimed
     from smajax.control.presets import CONTROLLERS
-    from smajax.control.reach import reach_of, reach_sentence
+    from smajax.control.reach import out_of_reach, reach_of, reach_sentence
     from smajax.control.tune.folder_names import FILES, STATE
     from smajax.control.tune.tuning_folder import tune_in_folder
     from smajax.report.tune_folder import finished, write_tuning
@@ -121,7 +125,16 @@ def _run(
     try:
         settings.check(plant, plants)
         made = replace(CONTROLLERS[settings.controller], fixed=settings.fixed).make(plant)
-        if sentence := reach_sentence(reach_of(plant, made), plant, settings.set_points):
+        reach = reach_of(plant, made)
+        beyond = () if typed else out_of_reach(reach, plant, settings.set_points)
+        if reach is not None and 0 < len(beyond) < len(settings.set_points):
+            left = tuple(one for one in settings.set_points if one not in beyond)
+            settings = replace(settings, set_points=left)
+            typer.echo(
+                f"Of the default set points {', '.join(f'{one:g}' for one in beyond)} {reach.unit.shown} {'are' if len(beyond) > 1 else 'is'} left out: {reach.words()}.",
+                err=True,
+            )
+        if sentence := reach_sentence(reach, plant, settings.set_points):
             raise ValueError(sentence)
         with (
             resumable(resume, out, STATE),
@@ -156,7 +169,7 @@ def tune(
         typer.Option(
             "--set-points",
             "--set-point",
-            help=f"with commas, {alone('deg (mm of a length)')}; default -40,-20,0,20,40,60,85, or six over the stroke of another load",
+            help=f"with commas, {alone('deg (mm of a length)')}; default -40,-20,0,20,40,60,85, or six over the stroke of another load, as far as they are in reach",
         ),
     ] = None,
     variation: Annotated[
@@ -285,7 +298,7 @@ def tune(
     sentence = understood("Set points", set_points, settings.set_points, unit.shown)
     if sentence and not json_out:
         typer.echo(sentence, err=True)
-    record = _run(assumed, settings, plants, out, overwrite, json_out, plant.words())
+    record = _run(assumed, settings, plants, out, overwrite, json_out, plant.words(), set_points is not None)
     page = out / "tune.html"
     for sentence in record["price"]:
         typer.echo(sentence, err=True)
