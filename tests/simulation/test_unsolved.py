@@ -5,9 +5,11 @@ from __future__ import annotations
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 
 import smajax as sma
 from smajax.simulation.observers import GOOD, UNSOLVED
+from smajax.simulation.simulate import UnsolvedWarning
 from tests.helpers.machine_code import by_machine_code
 
 ARM = sma.build("niti_table_3_1", "arm", "amplified_voltage")
@@ -16,7 +18,11 @@ ON_AND_OFF = {"voltage": jnp.where((jnp.arange(120) >= 20) & (jnp.arange(120) < 
 
 
 def test_stages_that_do_not_converge_are_counted_by_both_engines() -> None:
-    ours, theirs = sma.simulate_compiled(ARM, ON_AND_OFF, LONG), jax.jit(sma.simulate)(ARM, ON_AND_OFF, LONG)
+    with pytest.warns(UnsolvedWarning, match=r"of 119 steps did not converge, the first of them before \d+(\.5)? s"):
+        ours = sma.simulate_compiled(ARM, ON_AND_OFF, LONG)
+    with pytest.warns(UnsolvedWarning, match="Take a shorter `dt`"):
+        sma.simulate(ARM, ON_AND_OFF, LONG)
+    theirs = jax.jit(sma.simulate)(ARM, ON_AND_OFF, LONG)  # traced: without a warning
     assert ours.unsolved[0] == 0.0
     assert ours.unsolved[-1] > 0.0
     assert (np.diff(ours.unsolved) >= 0.0).all()
@@ -35,7 +41,8 @@ def test_a_run_of_a_batch_with_such_a_stage_is_marked_from_there_on() -> None:
     axes = sma.zipped(amplifier_gain=[0.1, float(sma.parameter_values(ARM)["amplifier_gain"])])
     found = sma.run_batch(ARM, ON_AND_OFF, axes, dt=LONG, tolerance=None)
     assert found["status"].values.tolist() == [GOOD, UNSOLVED]
-    run = sma.simulate_compiled(ARM, ON_AND_OFF, LONG)
+    with pytest.warns(UnsolvedWarning):
+        run = sma.simulate_compiled(ARM, ON_AND_OFF, LONG)
     assert found["first_bad_time"].values.tolist() == [np.inf, run.time[np.argmax(run.unsolved > 0.0)]]
     assert np.isnan(sma.good(found)["position"].values[1]).all()
 
