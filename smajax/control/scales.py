@@ -171,10 +171,16 @@ def is_arm(system: System) -> bool:
 
 
 def limited_as(system: System) -> Scalar | None:
-    """The largest command of an arm's amplifier or supply, V, where it is known; None where the limits of the presets hold."""
-    limit = system.drive.largest_command()
+    """The largest command of an arm's amplifier or supply, V, where it is known; None where the limits of the presets hold.
+
+    Where JAX traces the limit, which of the two is not known here: nan in place of None.
+    """
+    limit = jnp.asarray(system.drive.largest_command())
     at_wire = get_parameters(system, ["amplifier_limit"])[0] if "amplifier_limit" in parameters(system) else limit
-    return jnp.asarray(limit) if at_wire < NO_LIMIT else None
+    known = at_wire < NO_LIMIT
+    if isinstance(known, jax.core.Tracer):
+        return jnp.where(known, limit, jnp.nan)
+    return limit if known else None
 
 
 def on_amplifier(controller: Module, system: System, own: frozenset[str]) -> Module:
@@ -189,6 +195,8 @@ def on_amplifier(controller: Module, system: System, own: frozenset[str]) -> Mod
     names = [one for one in table if table[one].unit == "V" and not {one, str(table[one].path[0])} & own]
     values = dict(zip(names, get_parameters(controller, names), strict=True))
     put = {name: limit if name == "largest_voltage" else value * limit / ARM_LIMIT for name, value in values.items()}
+    if isinstance(limit, jax.core.Tracer):
+        put = {name: jnp.where(jnp.isnan(limit), values[name], value) for name, value in put.items()}
     return set_parameters(controller, put)
 
 

@@ -147,3 +147,18 @@ def test_an_arm_whose_amplifier_has_a_limit_is_led_up_to_that_limit(name: str) -
         assert made[gain] == pytest.approx(switched.get(gain, 1.0) * own[gain]), gain
     for gain, (low, high) in preset.box_on(system).items():
         assert (low, high) == pytest.approx(np.multiply(preset.box[gain], switched.get(gain, 1.0)), rel=1e-9)
+
+
+@pytest.mark.parametrize("limit", [1000.0, 30.6, 12.0])
+def test_a_limit_that_jax_traces_gives_the_same_controller(limit: float) -> None:
+    """Also the one of 1000 V that says that nobody knows it: the presets' own voltages hold then."""
+    preset = CONTROLLERS["vsc3"]
+
+    def voltages(at: jax.Array) -> jax.Array:
+        controller = preset.make(set_parameters(arm(), {"amplifier_limit": at}))
+        table = parameters(controller)
+        return get_parameters(controller, [name for name in table if table[name].unit == "V"])
+
+    known = np.asarray(voltages(jnp.asarray(limit)))
+    np.testing.assert_allclose(jax.jit(voltages)(jnp.asarray(limit)), known, rtol=1e-12)
+    assert known.size > 0
