@@ -170,17 +170,26 @@ def is_arm(system: System) -> bool:
     return isinstance(system.load, Arm)
 
 
-def limited_as(system: System) -> Scalar | None:
-    """The largest command of an arm's amplifier or supply, V, where it is known; None where the limits of the presets hold.
-
-    Where JAX traces the limit, which of the two is not known here: nan in place of None.
-    """
+def _limit(system: System) -> tuple[Scalar, Scalar]:
+    """(largest command of an arm's amplifier or supply, V; whether it is one: the presets' says that nobody knows it)."""
     limit = jnp.asarray(system.drive.largest_command())
     at_wire = get_parameters(system, ["amplifier_limit"])[0] if "amplifier_limit" in parameters(system) else limit
-    known = at_wire < NO_LIMIT
-    if isinstance(known, jax.core.Tracer):
-        return jnp.where(known, limit, jnp.nan)
+    return limit, at_wire < NO_LIMIT
+
+
+def limited_as(system: System) -> Scalar | None:
+    """The largest command of an arm's amplifier or supply, V, where it is known; None where the limits of the presets hold."""
+    limit, known = _limit(system)
     return limit if known else None
+
+
+def share_of_limit(name: str, limit: Scalar) -> Scalar:
+    """Factor of a voltage of an arm's controller, or of its bounds, where the largest command is `limit` (V) and not `ARM_LIMIT`.
+
+    A low level of a switch is one at which the wire cools, whatever the amplifier: it only goes down.
+    """
+    share = jnp.asarray(limit) / ARM_LIMIT
+    return jnp.minimum(share, 1.0) if name.rpartition(".")[2].startswith("low") else share
 
 
 def on_amplifier(controller: Module, system: System, own: frozenset[str]) -> Module:
@@ -188,16 +197,16 @@ def on_amplifier(controller: Module, system: System, own: frozenset[str]) -> Mod
 
     What it knows of its plant (`own`) stays.
     """
-    limit = limited_as(system)
-    if limit is None:
+    limit, known = _limit(system)
+    if not isinstance(known, jax.core.Tracer) and not known:
         return controller
     table = parameters(controller)
     names = [one for one in table if table[one].unit == "V" and not {one, str(table[one].path[0])} & own]
     values = dict(zip(names, get_parameters(controller, names), strict=True))
-    put = {name: limit if name == "largest_voltage" else value * limit / ARM_LIMIT for name, value in values.items()}
-    if isinstance(limit, jax.core.Tracer):
-        put = {name: jnp.where(jnp.isnan(limit), values[name], value) for name, value in put.items()}
-    return set_parameters(controller, put)
+    put = {
+        name: limit if name == "largest_voltage" else one * share_of_limit(name, limit) for name, one in values.items()
+    }
+    return set_parameters(controller, {name: jnp.where(known, put[name], one) for name, one in values.items()})
 
 
 def scaled(controller: Module, factors: Mapping[str, Scalar], own: frozenset[str]) -> Module:

@@ -209,10 +209,13 @@ def parse_quantity(
         raise UnitError(f"got {value!r} without a unit, expected one like {like!r}; write '{number:g} {like}'")
     try:
         shift = _shift(unit, expected, difference)
-    except UnitError:
+    except UnitError as error:
         if not also:
             raise
-        return parse_quantity(value, also, difference)
+        try:
+            return parse_quantity(value, also, difference)
+        except UnitError:
+            raise error from None
     if shift is None or len(digits) > LONGEST:
         return float(convert(number, unit, expected, difference))
     # As if it were written in the unit expected: 0.31 mm is 0.00031 m, and not a bit beside it.

@@ -35,7 +35,10 @@ RELATIVE: Mapping[str, tuple[float, str]] = {
         2.0,
         "no sheet gives it; the presets' is chosen so that nothing rings, and a bearing has a hundredth of it",
     ),
-    "inertia_ratio": (0.1, "hub, pulley and cable, which the masses of payload and link do not have: to 10 %"),
+    "inertia_ratio": (
+        0.2,
+        "hub, pulley and cable, which the masses of payload and link do not have: a fifth of their inertia",
+    ),
 }
 # The sign may be the other one: a normal prior, as wide as a share of the value.
 SIGNED = frozenset({"thermal_modulus"})

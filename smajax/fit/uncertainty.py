@@ -16,9 +16,11 @@ from smajax.core.whiteness import WHITE, bartlett_sum, correlation_time, split_r
 from smajax.fit.sensitivity import Sensitivity
 
 # A fitted value nearer to a bound than this share of the range counts as at the bound, unless it is farther from it than so many
-# standard errors, all else held: bounds of a friction go to 20 N m, and an arm's may be a thousandth of that.
+# standard errors with all else held, and so many with all else free: bounds of a friction go to 20 N m, and an arm's may be a
+# thousandth of that.
 AT_BOUND = 2e-3
 CLEAR_OF_BOUND = 5.0
+CLEAR_BESIDE_OTHERS = 2.0
 ENDED = 1e-6  # of the range: a fit that ends so near to a bound was stopped by it
 ORDERS_APART = 100.0  # bounds, one over the other, of a parameter whose size is what is unknown
 # Two parameters whose estimates are correlated more than this: the runs determine one combination of them.
@@ -84,16 +86,6 @@ def at_bound(value: float, low: float, high: float, edge: float = AT_BOUND) -> R
     if value - low < span:
         return Remark(RemarkKind.LOWER_BOUND)
     return Remark(RemarkKind.UPPER_BOUND) if high - value < span else Remark()
-
-
-def _clear_of_bound(
-    at: Sensitivity, name: str, value: float, bounds: tuple[float, float], variance: float | None
-) -> bool:
-    """Whether the runs would tell `name` at the nearer of its bounds from where it is, with all else held."""
-    own, priors = at.columns([name]), at.prior_columns([name])
-    covariance, scale = _covariance(own, priors, split_runs(at.misfit, at.mask), variance)
-    distance = min(value - bounds[0], bounds[1] - value) * scale[0]
-    return bool(distance > CLEAR_OF_BOUND * math.sqrt(max(covariance[0, 0], 0.0)) > 0.0)
 
 
 def _covariance(
@@ -163,6 +155,34 @@ def clusters(covariance: np.ndarray) -> list[list[int]]:
     return [cluster for cluster in clusters if len(cluster) > 1]
 
 
+def _clear_of_bounds(
+    at: Sensitivity,
+    near: Sequence[str],
+    free: Sequence[str],
+    values: Mapping[str, float],
+    bounds: Mapping[str, tuple[float, float]],
+    variance: float | None,
+) -> set[str]:
+    """Those of the parameters `near` a bound that the runs tell from it: with all else held, and with all else free."""
+    told = set()
+    for name in near:
+        distance = min(values[name] - bounds[name][0], bounds[name][1] - values[name])
+        if distance > ENDED * (bounds[name][1] - bounds[name][0]) and all(
+            distance > times * _error(at, name, others, variance) > 0.0
+            for times, others in ((CLEAR_OF_BOUND, ()), (CLEAR_BESIDE_OTHERS, [one for one in free if one != name]))
+        ):
+            told.add(name)
+    return told
+
+
+def _error(at: Sensitivity, name: str, others: Sequence[str], variance: float | None) -> float:
+    """Standard error of `name` with `others` free; infinite where it has none."""
+    own = [name, *others]
+    covariance, scale = _covariance(at.columns(own), at.prior_columns(own), split_runs(at.misfit, at.mask), variance)
+    found = float(covariance[0, 0])
+    return math.sqrt(found) / float(scale[0]) if found > 0.0 and math.isfinite(found) else math.inf
+
+
 def uncertainty(
     at: Sensitivity,
     names: Sequence[str],
@@ -176,9 +196,9 @@ def uncertainty(
     `variance` of a sample, over the noise's, in the place of the residual's; `edge`: share of the range that is at a bound.
     """
     remark = {name: at_bound(values[name], *bounds[name], edge) for name in names}
-    for name in [name for name in names if remark[name] and not at_bound(values[name], *bounds[name], ENDED)]:
-        if _clear_of_bound(at, name, values[name], bounds[name], variance):
-            remark[name] = Remark()
+    near = [name for name in names if remark[name]]
+    for name in _clear_of_bounds(at, near, [name for name in names if not remark[name]], values, bounds, variance):
+        remark[name] = Remark()
     free = [name for name in names if not remark[name]]
     errors: dict[str, float | None] = dict.fromkeys(names)
     if not free:

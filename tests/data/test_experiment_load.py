@@ -183,7 +183,7 @@ def test_two_outputs_have_their_own_noise_and_offset(bench: Path) -> None:
         "temperature",
         False,
     )
-    assert temperature.noise_sigma == pytest.approx(0.5 * 0.502, rel=0.01)
+    assert temperature.noise_sigma == pytest.approx(0.5 * 0.466, rel=0.01)
     np.testing.assert_allclose(got.runs[0].outputs["temperature"], 1e3 * got.runs[0].output - 273.15, atol=1e-9)
     # These numbers are degrees Celsius, and are declared to be kelvins.
     assert any(

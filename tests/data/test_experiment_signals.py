@@ -14,7 +14,7 @@ from tests.helpers.bench_experiment import changed, load, rewrite, write_run
 def test_a_given_noise_shrinks_with_the_average_over_a_step(bench: Path) -> None:
     got = load(bench)
     at_rest = np.concatenate([run.output[1:20] for run in got.runs])
-    assert got.noise_sigma == pytest.approx(1e-5 * 0.502, rel=0.01)
+    assert got.noise_sigma == pytest.approx(1e-5 * 0.466, rel=0.01)
     assert got.outputs[0].reading_sigma == 1e-5
     assert np.std(at_rest) == pytest.approx(got.noise_sigma, rel=0.35)
     assert "given as 0.01 mm" in got.noise_how
@@ -22,7 +22,7 @@ def test_a_given_noise_shrinks_with_the_average_over_a_step(bench: Path) -> None
 
 def test_an_estimated_noise_is_that_of_the_resampled_output(bench: Path) -> None:
     got = load(changed(bench, 'noise = "0.01 mm"', 'noise = "estimate"'))
-    assert got.noise_sigma == pytest.approx(1e-5 * 0.502, rel=0.25)
+    assert got.noise_sigma == pytest.approx(1e-5 * 0.466, rel=0.25)
     assert got.outputs[0].reading_sigma == pytest.approx(1e-5, rel=0.25)
     assert got.noise_how.startswith("estimated from 1 fit run")
 
@@ -53,7 +53,7 @@ def test_missing_samples_and_gaps_in_time_are_left_out(bench: Path) -> None:
     assert away[(run.time > 2.05) & (run.time < 2.95)].all()
     assert not away[(run.time < 0.95) | ((run.time > 1.45) & (run.time < 1.9)) | (run.time > 3.05)].any()
     assert np.isfinite(run.inputs["duty"]).all()
-    assert got.noise_sigma == pytest.approx(1e-5 * 0.502, rel=0.3)
+    assert got.noise_sigma == pytest.approx(1e-5 * 0.466, rel=0.3)
     assert not any("gap" in one for one in got.warnings if "'position'" in one)
 
 

@@ -98,6 +98,20 @@ def test_a_small_size_that_the_runs_tell_from_zero_is_not_at_its_bound(size: flo
     assert (found.standard_error["a"] is None) == (kind is RemarkKind.LOWER_BOUND)
 
 
+def test_a_small_size_that_another_parameter_may_take_over_is_at_its_bound() -> None:
+    """Fifty standard errors from zero with the other held, half of one with it free."""
+    random = np.random.default_rng(3)
+    first = random.normal(size=1600) * 1e3
+    columns = np.stack([first, 0.1 * (first + 3.0 * random.normal(size=1600))], axis=1)
+    found = uncertainty(
+        _sensitivity(columns, random.normal(size=1600)),
+        ("a", "b"),
+        {"a": 1.25e-3, "b": 3.0},
+        {"a": (0.0, 20.0), "b": (-9.0, 9.0)},
+    )
+    assert found.remarks["a"].kind is RemarkKind.LOWER_BOUND
+
+
 def _estimates_with(covariance: np.ndarray, seed: int, samples: int = 4000) -> Sensitivity:
     """Runs in which the estimates of a, b, c, ... have this covariance, with white noise of one left."""
     rng = np.random.default_rng(seed)

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 
 from smajax.control.controllers.base import AbstractController
 from smajax.control.load_equation import missing_for_equation, missing_for_stroke
-from smajax.control.scales import ARM_LIMIT, factors_for, is_arm, limited_as, on_amplifier, scaled
+from smajax.control.scales import factors_for, is_arm, limited_as, on_amplifier, scaled, share_of_limit
 from smajax.core.parameters import parameters, set_parameters
 from smajax.engine import Engine
 from smajax.model.load.base import AbstractMovingLoad
@@ -98,7 +98,10 @@ class ControllerPreset:
         if limit is None:
             factors, apart = factors_for(system, controller, self.scales), WIDER
         else:
-            factors, apart = {name: limit / ARM_LIMIT if name in volts else jnp.ones(()) for name in self.box}, 1.0
+            factors, apart = (
+                {name: share_of_limit(name, limit) if name in volts else jnp.ones(()) for name in self.box},
+                1.0,
+            )
 
         def held(bound: float, name: str, wider: float) -> float:
             scaled_bound = bound * float(factors[name]) * (1.0 if name in volts else wider)
