@@ -22,6 +22,7 @@ DECIMATION_FROM = 1.05
 # (with one step a sample is correlated with its neighbour by -0.1); of fewer samples a step than `FEW` one step does.
 NARROWER = 7.0 / 6.0
 FEW = 2.2
+PHASES = 40  # instants over whose places between samples the noise is averaged
 # A value more than this share of which would be made up is missing.
 MADE_UP = 0.25
 # Sample intervals without a row from which on samples are missing.
@@ -145,12 +146,19 @@ def resample_with_gaps(time: Array, values: Array, clock: Array, step: float) ->
 
 
 def window_noise_gain(samples_per_step: float) -> float:
-    """Sigma of white noise after `resample_output`, over its sigma before, at instants on a sample; about 1.09/sqrt(samples).
+    """Sigma of white noise after `resample_output`, over its sigma before; about 1.09/sqrt(samples).
 
-    The sample j away from the instant weighs the integral over the window of the hat function centred on it.
+    Where the first instant is on a sample, over the places between samples that the next ones have.
     """
+    phases = np.unique(np.round(np.arange(PHASES) * samples_per_step % 1.0, 3))
+    return float(np.sqrt(np.mean([_squared_weights(samples_per_step, float(phase)) for phase in phases])))
+
+
+def _squared_weights(samples_per_step: float, phase: float) -> float:
+    """Sum of the squared weights of the samples, of an instant so much after one of them; a sample weighs the integral over the window of
+    the hat function centred on it."""
     half = _half_width(samples_per_step) * samples_per_step
-    reach = np.arange(-int(2.0 * half) - 2, int(2.0 * half) + 3, dtype=np.float64)
+    reach = np.arange(-int(2.0 * half) - 3, int(2.0 * half) + 4, dtype=np.float64) - phase
 
     def hat_integral(at: Array) -> Array:
         inside = np.clip(at, -1.0, 1.0)
@@ -158,4 +166,4 @@ def window_noise_gain(samples_per_step: float) -> float:
 
     one, two = ((hat_integral(h - reach) - hat_integral(-h - reach)) / (2.0 * h) for h in (half, 2.0 * half))
     more = _wider_share(np.asarray(one @ reach**2), np.asarray(two @ reach**2))
-    return float(np.sqrt(np.sum(((1.0 + more) * one - more * two) ** 2)))
+    return float(np.sum(((1.0 + more) * one - more * two) ** 2))
