@@ -94,7 +94,7 @@ def test_a_parabola_stays_where_the_samples_come_unevenly() -> None:
 def test_white_noise_of_a_sensor_is_white_on_the_clock(samples: int) -> None:
     """Else every model would leave an autocorrelated residual, and the noise that differences of neighbours show would be wrong."""
     noise = np.random.default_rng(samples).normal(size=samples * 20_000)
-    time = STEP / samples * np.arange(noise.size)
+    time = STEP / samples * np.arange(noise.size, dtype=np.float64)
     values = resample_output(time, noise, uniform_clock(0.0, time[-1], STEP), STEP).values[2:-2]
     assert np.corrcoef(values[1:], values[:-1])[0, 1] == pytest.approx(0.0, abs=0.035)
     assert np.corrcoef(values[2:], values[:-2])[0, 1] == pytest.approx(0.0, abs=0.02)
