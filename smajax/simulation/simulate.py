@@ -163,12 +163,13 @@ def warn_of_unsolved(run: Trajectory) -> None:
     """
     if isinstance(run.unsolved, jax.core.Tracer) or run.unsolved.dtype != np.float64:
         return
-    count = int(run.unsolved[-1])
-    if count == 0:
+    late = (
+        np.flatnonzero(np.diff(np.asarray(run.unsolved)) > 0.0) + 1
+    )  # a step counts once, whichever of its stages it was
+    if not late.size:
         return
-    first = float(run.time[int(np.argmax(np.asarray(run.unsolved) > 0))])
     text = (
-        f"{count} of {len(run.time) - 1} steps did not converge, the first of them before {first:.6g} s: the run may be wrong from there on. "
+        f"{late.size} of {len(run.time) - 1} steps did not converge, the first of them before {float(run.time[late[0]]):.6g} s: the run may be wrong from there on. "
         "Take a shorter `dt`, or several steps between two samples (`simulate_compiled(..., tolerance=1e-4)`)."
     )
     warnings.warn(text, UnsolvedWarning, stacklevel=3)
