@@ -198,8 +198,6 @@ def on_amplifier(controller: Module, system: System, own: frozenset[str]) -> Mod
     What it knows of its plant (`own`) stays.
     """
     limit, known = _limit(system)
-    if not isinstance(known, jax.core.Tracer) and not known:
-        return controller
     table = parameters(controller)
     names = [one for one in table if table[one].unit == "V" and not {one, str(table[one].path[0])} & own]
     values = dict(zip(names, get_parameters(controller, names), strict=True))

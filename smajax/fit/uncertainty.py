@@ -166,11 +166,12 @@ def _clear_of_bounds(
     """Those of the parameters `near` a bound that the runs tell from it: with all else held, and with all else free."""
     told = set()
     for name in near:
-        distance = min(values[name] - bounds[name][0], bounds[name][1] - values[name])
-        if distance > ENDED * (bounds[name][1] - bounds[name][0]) and all(
-            distance > times * _error(at, name, others, variance) > 0.0
-            for times, others in ((CLEAR_OF_BOUND, ()), (CLEAR_BESIDE_OTHERS, [one for one in free if one != name]))
-        ):
+        low, high = bounds[name]
+        distance = min(values[name] - low, high - values[name])
+        if distance <= ENDED * (high - low):
+            continue
+        alone, beside = _error(at, name, (), variance), _error(at, name, free, variance)
+        if distance > CLEAR_OF_BOUND * alone > 0.0 and distance > CLEAR_BESIDE_OTHERS * beside > 0.0:
             told.add(name)
     return told
 
