@@ -45,6 +45,11 @@ def _spread(system: eqx.Module, shares: list[float]) -> eqx.Module:
     return set_parameters(system, moved)
 
 
+# The invariants hold in a step that does not converge as well, which a few of random runs have.
+EVERY_STEP = pytest.mark.filterwarnings("ignore:.*did not converge:smajax.simulation.simulate.UnsolvedWarning")
+
+
+@EVERY_STEP
 @settings(max_examples=40, deadline=None)
 @given(
     rig=st.sampled_from(sorted(RIGS)),
@@ -78,6 +83,7 @@ SOME = (
 )
 
 
+@EVERY_STEP
 @pytest.mark.parametrize("library", [SOME, pytest.param(tuple(LIBRARY), marks=pytest.mark.slow)], ids=["some", "all"])
 @settings(max_examples=15, deadline=None)
 @given(
