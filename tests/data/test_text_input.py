@@ -8,9 +8,9 @@ import pytest
 from smajax.data.readers.resolution_levels import likeliest_increment
 
 
-def _strokes(rng: np.random.Generator) -> list[np.ndarray]:
+def _strokes(rng: np.random.Generator, samples: int = 800) -> list[np.ndarray]:
     """Three runs that rest at both ends and pass slowly between, each with a zero of its own."""
-    time = np.linspace(0.0, 1.0, 800)
+    time = np.linspace(0.0, 1.0, samples)
     return [
         1e-2 * np.clip(1.6 * np.sin(np.pi * count * time) ** 2 - 0.3, 0.0, 1.0) + zero
         for count, zero in zip((1, 2, 3), rng.uniform(-1e-3, 1e-3, 3), strict=True)
@@ -25,6 +25,25 @@ def test_the_increment_of_a_staircase_is_found(share: float) -> None:
         stairs = increment * np.round(stroke / increment) + 1e-4 * zero
         logs.append(stairs + 0.05 * increment * rng.normal(size=stroke.size))
     assert likeliest_increment(logs, 0.05 * increment) == pytest.approx(increment, rel=0.5 * share)
+
+
+@pytest.mark.parametrize("samples", [200, 800, 8000])
+@pytest.mark.parametrize("noises", [9.5, 11.0, 25.0])
+def test_levels_are_found_however_many_samples_show_their_noise(noises: float, samples: int) -> None:
+    rng, increment = np.random.default_rng(5), 0.05 * 1e-2
+    logs = [
+        increment * np.round(stroke / increment) + increment / noises * rng.normal(size=samples)
+        for stroke in _strokes(rng, samples)
+    ]
+    assert likeliest_increment(logs, increment / noises) == pytest.approx(increment, rel=0.02)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_few_places_where_a_reading_rests_are_no_levels(seed: int) -> None:
+    """Four a run: at some of a thousand increments they lie as if on levels."""
+    rng = np.random.default_rng(seed)
+    logs = [np.repeat(rng.uniform(0.0, 1e-2, 4), 200) + 1e-5 * rng.normal(size=800) for _ in range(3)]
+    assert likeliest_increment(logs, 1e-5) == 0.0
 
 
 def test_a_smooth_log_has_no_increment() -> None:
