@@ -6,7 +6,7 @@ import hashlib
 import time as clock
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import jax.numpy as jnp
@@ -16,6 +16,7 @@ from smajax.attribution.assumed_parameters import assumed, expansion_not_given
 from smajax.attribution.averaged_prediction import Averaged, averaged, with_averages
 from smajax.attribution.config import AttributionConfig
 from smajax.attribution.confounders import confounders
+from smajax.attribution.context import Context, Interim, Outcome
 from smajax.attribution.declared_priors import of_unknowns
 from smajax.attribution.final_model_findings import effects_found, parameters_found, priors_found
 from smajax.attribution.findings import (
@@ -28,8 +29,8 @@ from smajax.attribution.findings import (
 )
 from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.held_out import Compared, compare, every_run, validated
-from smajax.attribution.input_of_run import corrected, record_error
-from smajax.attribution.job import Job, effects_excluded, job_of
+from smajax.attribution.input_of_run import as_fitted, corrected, record_error
+from smajax.attribution.job import effects_excluded, job_of
 from smajax.attribution.joint_stage import (
     base_alone,
     likeliest_so_far,
@@ -41,7 +42,7 @@ from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.neutral_at_base import check_neutral
 from smajax.attribution.outlier_run import outlier_runs
-from smajax.attribution.record_error import OutlierRun, RecordError
+from smajax.attribution.record_error import RecordError
 from smajax.attribution.saved_model import fit_run_states, saved_model
 from smajax.attribution.step_size_check import finer_integration, integration_error_of
 from smajax.attribution.unknown.search import Lacking, in_place_of, unknown_terms
@@ -52,7 +53,6 @@ from smajax.core.provenance import made_with
 from smajax.core.result_cache import ResultCache
 from smajax.data.experiment.record import Experiment
 from smajax.fit.identifiability import Checks, TakenAt, identifiability
-from smajax.fit.levenberg_marquardt import Fit
 from smajax.fit.preset_priors import visible
 from smajax.fit.sensitivity import sensitivity
 from smajax.simulation.steppers import Integration
@@ -62,38 +62,6 @@ MOST_SEARCHES = 2  # the first, and again without what the held-out runs rejecte
 MOST_RECORD_ERRORS = 2  # of single runs that are corrected: with more of them nothing is left that says which is right
 EVERY, RARELY = 60.0, 8.0  # s before the first page of a search that goes on; times what the last took before the next
 CHECKING, WRITING = "checking what these runs determine", "standard errors and pictures"
-
-Interim = Callable[[Findings], object]  # gets what is known of an attribution that goes on
-
-
-@dataclass(frozen=True)
-class Context:
-    """What every stage of one attribution shares; `setting` collects the rounds and the evidence."""
-
-    job: Job
-    setting: Search
-    start: np.ndarray  # (P,), start values of the parameters of base model and library
-    base: Fit  # the base model
-    seed: int
-    checks: Checks
-    interim: Interim | None
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """The models so far, and what the stages since the search have found out."""
-
-    search: JointSearch
-    base: Model
-    final: Model
-    lacking: Lacking | None = None  # unknown terms, where they have been asked for
-    superseded: tuple[str, ...] = ()
-    outliers: tuple[OutlierRun, ...] = ()
-
-    @property
-    def one_outlier(self) -> bool:
-        """Whether without one run all the others are explained."""
-        return any(run.residual_is_noise for run in self.outliers)
 
 
 @on_one_blas_thread
@@ -134,12 +102,11 @@ def close_loop(  # keywords, which a caller names one by one
     if interim is not None:
         interim(known_so_far(context, base_alone(context.setting, context.base), Remaining.SEARCH))
     context, outcome = searched_finely(context)
-    errors: list[RecordError] = []
-    while len(errors) < MOST_RECORD_ERRORS and (wrong := wrong_record(context, outcome)) is not None:
+    while len(context.record_errors) < MOST_RECORD_ERRORS and (wrong := wrong_record(context, outcome)) is not None:
         # All else is asked of the runs as they should have been recorded.
-        errors.append(wrong)
-        right = corrected(context.job.experiment, wrong)
-        context = prepared(right, cache, context.setting.progress, seed, settings, interim)
+        context.setting.progress(Result(wrong))
+        right, errors = corrected(context.job.experiment, wrong), (*context.record_errors, wrong)
+        context = prepared(right, cache, context.setting.progress, seed, settings, interim, record_errors=errors)
         context, outcome = searched_finely(context)
     if interim is not None and not context.setting.is_noise(outcome.final):
         interim(known_so_far(context, (outcome.search, outcome.base, outcome.final), Remaining.CHECKS))
@@ -147,7 +114,7 @@ def close_loop(  # keywords, which a caller names one by one
     outcome = against_an_outlier_run(context, against_an_unknown_term(context, outcome))
     found = findings_of(context, outcome, compare(context.job, context.setting, outcome.base, outcome.final), rejected)
     provenance = _provenance(experiment, cache, command, seed, clock.monotonic() - began)
-    return replace(found, record_errors=tuple(errors), provenance=provenance)
+    return replace(found, provenance=provenance)
 
 
 def prepared(  # the stage's inputs, each once
@@ -158,6 +125,7 @@ def prepared(  # the stage's inputs, each once
     config: AttributionConfig,
     interim: Interim | None = None,
     integration: Integration | None = None,
+    record_errors: tuple[RecordError, ...] = (),
 ) -> Context:
     """The experiment as a problem, its base model fitted, and what its runs determine, from the Jacobian there."""
     job = job_of(experiment, integration)
@@ -182,7 +150,7 @@ def prepared(  # the stage's inputs, each once
     base = setting.base(start, seed)
     # It was chosen where the fit begins, at which the wire may not even move. Now, and not when the whole search has been made with it.
     if integration is None and (finer := finer_integration(setting, (), base.values)) is not None:
-        return prepared(experiment, cache, progress, seed, config, interim, finer)
+        return prepared(experiment, cache, progress, seed, config, interim, finer, record_errors)
     progress(Stage(CHECKING, 0.0))
     problem, index = setting.restricted(())
     at_fit = sensitivity(problem, base.values[np.asarray(index)], [*job.unknowns, *job.presets])
@@ -192,7 +160,7 @@ def prepared(  # the stage's inputs, each once
     checks = Checks(identifiable, hidden_by_one_force=job.hidden_by_one_force)
     progress(Stage(CHECKING, 1.0))
     progress(Result(checks))
-    context = Context(job, setting, start, base, seed, checks, interim)
+    context = Context(job, setting, start, base, seed, checks, interim, record_errors)
     setting.after_round = None if interim is None else _now_and_then(context, interim)
     return context
 
@@ -220,7 +188,7 @@ def searched_finely(context: Context) -> tuple[Context, Outcome]:
     if finer is None:
         return context, outcome
     given = context.job.experiment, setting.cache, setting.progress, context.seed, setting.config, context.interim
-    context = prepared(*given, finer)
+    context = prepared(*given, finer, context.record_errors)
     context.setting.rounds += setting.rounds
     return context, Outcome(*search_again(context.setting, context.base, outcome.search))
 
@@ -377,6 +345,9 @@ def findings_of(
         confounders=mistaken,
         superseded=superseded,
         rejected=rejected,
+        record_errors=tuple(
+            as_fitted(one, (after if final.effects else before).parameters) for one in context.record_errors
+        ),
         unknown=lacking.terms,
         outlier_runs=outcome.outliers,
         config=setting.config,

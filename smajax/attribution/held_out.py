@@ -93,10 +93,14 @@ def _beside(new: Compared, old: Compared, setting: Search, which: Literal["befor
 def _simulated(
     setting: Search, model: Model | FittedModel, batch: RunBatch, runs: Sequence[str]
 ) -> tuple[Trajectory, np.ndarray, dict[str, dict[str, float]]]:
-    """(trajectories, sensors' outputs, values of each run's own by its name)."""
+    """(trajectories, sensors' outputs, values of each run's own by its name, without what single runs alone have)."""
     there, (values,) = on_runs(setting, model.effects, [model.values], batch, runs)
     own = np.asarray(there.per_run_at(jnp.asarray(values))).tolist()
-    named = {run: dict(zip(there.per_run.names, row, strict=True)) for run, row in zip(runs, own, strict=True)}
+    names, single = there.per_run.names, there.per_run.single
+    named = {
+        run: {name: value for name, value in zip(names, row, strict=True) if name not in single}
+        for run, row in zip(runs, own, strict=True)
+    }
     return *simulate_with_outputs(there.system_at(jnp.asarray(values)), there.with_own_values(values)), named
 
 

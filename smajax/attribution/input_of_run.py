@@ -3,7 +3,8 @@
 Each is an effect of the library with a value of that run alone, and an event with the prior odds of one, shared among the runs. It
 is fitted together with all parameters of the base model and of the likeliest model, in the runs that these leave most of, and
 compared by its evidence as sets of effects are. Asked only where something is missing. Where one is likelier, and explains what was
-missing, `close-loop` goes on with the run corrected by it (`corrected`): what the search named in its place was a stand-in.
+missing, `close-loop` goes on with the run corrected by it (`corrected`): what the search named in its place was a stand-in. How large it is stays
+an unknown of that run: the first value was found beside stand-ins, and held there it made others needed.
 
 A model that leaves far more than noise lacks something else as well, and an error of a record is the first thing to take a part of it
 over: on a bench of which the best model leaves 12 noises, a clock that was half a second late at its end in one run was
@@ -20,6 +21,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
+from smajax.attribution.findings import ParameterFinding
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model, independent_error
 from smajax.attribution.model_fits import Model, Search
@@ -27,7 +29,8 @@ from smajax.attribution.program_fits import comparison_settings
 from smajax.attribution.record_error import RecordError
 from smajax.core.names_of_runs import of_run
 from smajax.core.parameters import parameters
-from smajax.data.experiment.record import Experiment, Run
+from smajax.data.experiment.record import Experiment, Prior, Run, Unknown
+from smajax.fit.base_model import base_model
 from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
 from smajax.fit.outputs_of_runs import misfits
 from smajax.fit.problem import PerRun, Problem
@@ -135,7 +138,8 @@ def _fits(setting: Search, host: Model, runs: Sequence[str]) -> list[tuple[_Even
     whole = with_effects(system, [kind.coefficient.split(".")[0] for kind in kinds])
     before = own.per_run_at(jnp.asarray(host.values[slots]))
     start = jnp.concatenate([before, jnp.zeros((len(runs), len(kinds)))], axis=1)
-    per_run = PerRun((*own.per_run.names, *(kind.coefficient for kind in kinds)), tuple(runs), start)
+    names = (*own.per_run.names, *(kind.coefficient for kind in kinds))
+    per_run = PerRun(names, tuple(runs), start, own.per_run.single)
     problem = own.with_system(whole, per_run=per_run)
     (left,) = misfits(own, [host.values[slots]])
     worst = np.argsort(-(own.by_run(left) ** 2).sum(axis=1), kind="stable")[:MOST_RUNS]
@@ -203,9 +207,27 @@ def _channel(system: System, coefficient: str, run: Run) -> str:
 
 
 def corrected(experiment: Experiment, found: RecordError) -> Experiment:
-    """The experiment with one run as it should have been recorded: the effect in the base model, off in all other runs."""
-    runs = tuple(
-        replace(run, parameters={**run.parameters, found.coefficient: found.value}) if run.name == found.run else run
-        for run in experiment.runs
+    """The experiment with one run as it should have been recorded: the effect in the base model, off in all other runs.
+
+    Its size in that run is an unknown that begins at what was found.
+    """
+    kind = next(one for one in KINDS if one.coefficient == found.coefficient)
+    table = parameters(with_effects(base_model(experiment), [found.coefficient.split(".")[0]]))
+    about = table[found.coefficient]
+    low, high = min(about.low, found.value), max(about.high, found.value)
+    prior = Prior(0.0, kind.sigma, False)
+    unknown = Unknown(found.coefficient, about.unit, low, high, found.value, True, prior, (found.run,))
+    return replace(
+        experiment,
+        unknowns=(*experiment.unknowns, unknown),
+        parameters={**experiment.parameters, found.coefficient: 0.0},
     )
-    return replace(experiment, runs=runs, parameters={**experiment.parameters, found.coefficient: 0.0})
+
+
+def as_fitted(found: RecordError, after: Sequence[ParameterFinding]) -> RecordError:
+    """The error as the final model has it, of which `after` are the parameters."""
+    own = next((one for one in after if one.name == of_run(found.coefficient, found.run)), None)
+    if own is None:
+        return found
+    error = found.standard_error if own.standard_error is None else own.standard_error
+    return replace(found, value=own.value, standard_error=error)

@@ -120,17 +120,21 @@ def _with_own_values_fitted(
 ) -> list[np.ndarray]:
     """`points` (P,) without each part of the runs, with the own values of its runs fitted to them, as of a run that is held out."""
     own = _own(problem, model.names, parts[problem.owner])
+    with_some = [part for part in range(len(points)) if part in own]
     tasks = [
         problem.task(
             [name for name, whose in zip(model.names, own, strict=True) if whose == part],
             joint.bounds,
-            point,
+            points[part],
             (parts == part).astype(float),
         )
-        for part, point in enumerate(points)
+        for part in with_some
     ]
     fits = levenberg_marquardt(problem, tasks, FitSettings(max_steps=STEPS, tolerance=TOLERANCE))
-    return [fit.values for fit in fits]
+    result = list(points)
+    for part, fit in zip(with_some, fits, strict=True):
+        result[part] = fit.values
+    return result
 
 
 def _cost(misfit: np.ndarray, error: float, series: np.ndarray) -> float:

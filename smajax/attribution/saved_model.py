@@ -84,7 +84,8 @@ def _likely(job: Job, search: JointSearch, model: FittedModel, values: np.ndarra
     covariance = model.covariance(search.error(model) ** 2) * np.outer(model.scales, model.scales)
     declared = job.experiment.declared_effects
     priors = dataclasses.replace(search.joint, width_factors=model.width_factors).prior_records(model.effects)
-    of_runs = OfRuns.among({name: at[name] for name in model.names})
+    single = job.problem.per_run.single  # errors of single runs' records: nothing that another run has
+    of_runs = OfRuns.among({name: at[name] for name in model.names if parameter_of(name) not in single})
     names, whole = of_runs.beside(model.names, covariance)
     shared = [name for name in model.names if not is_of_run(name)]
     return LikelyModel(

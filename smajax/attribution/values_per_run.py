@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.model_fits import Search
+from smajax.core.names_of_runs import parameter_of
 from smajax.core.whiteness import split_runs
 from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
 from smajax.fit.outputs_of_runs import misfits
@@ -30,10 +31,13 @@ def on_runs(
     if not own.names:
         return problem.with_system(problem.system, batch), [one[index] for one in values]
     start = np.tile(np.asarray(own.start)[:1], (len(runs), 1))
-    per_run = PerRun(own.names, tuple(runs), jnp.asarray(start))
-    bounds = {name: setting.bounds[own.of_first_run(name)] for name in per_run.full_names}
+    # What single runs have of their own is of an effect that changes nothing in the others.
+    start[:, [name in own.single for name in own.names]] = 0.0
+    per_run = PerRun(own.names, tuple(runs), jnp.asarray(start), own.single)
+    fitted = _fitted(per_run)
+    bounds = {name: setting.bounds[own.of_first_run(name)] for name in fitted}
     records = setting.prior_records(presets=False)
-    priors = {name: prior for name in per_run.full_names if (prior := records.get(own.of_first_run(name))) is not None}
+    priors = {name: prior for name in fitted if (prior := records.get(own.of_first_run(name))) is not None}
     there = problem.with_system(problem.system, batch, per_run, priors)
     points = []
     for one in values:
@@ -41,12 +45,17 @@ def on_runs(
         points.append(
             np.asarray([known.get(name, at) for name, at in zip(there.names, there.start_values(), strict=True)])
         )
-    free = [name for name in per_run.full_names if name not in problem.names]
+    free = [name for name in fitted if name not in problem.names]
     if free:
         settings = FitSettings(cache=setting.cache, progress=setting.progress, stage=STAGE)
         fits = levenberg_marquardt(there, [there.task(free, bounds, point) for point in points], settings)
         points = [fit.values for fit in fits]
     return there, points
+
+
+def _fitted(per_run: PerRun) -> list[str]:
+    """The values that every run has of its own."""
+    return [name for name in per_run.full_names if parameter_of(name) not in per_run.single]
 
 
 def with_other_runs(
@@ -63,7 +72,7 @@ def with_other_runs(
     of the first output.
     """
     names, sizes, covariance = posterior
-    own = [name for name in problem.per_run.full_names if name not in names]
+    own = [name for name in _fitted(problem.per_run) if name not in names]
     if not own:
         return posterior
     widths = []

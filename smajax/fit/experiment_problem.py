@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
 import jax.numpy as jnp
-import numpy as np
 
 from smajax.core.names_of_runs import of_run
 from smajax.core.parameters import parameter_values
@@ -21,16 +20,23 @@ def free_by_name(experiment: Experiment, runs: Sequence[Run]) -> dict[str, Unkno
     """Every unknown of these runs: `name`, or `name[run]` where it has one value for each run, those last."""
     shared = {unknown.name: unknown for unknown in experiment.unknowns if not unknown.per_run}
     per_run = {
-        of_run(unknown.name, run.name): unknown for run in runs for unknown in experiment.unknowns if unknown.per_run
+        of_run(unknown.name, run.name): unknown
+        for run in runs
+        for unknown in experiment.unknowns
+        if unknown.of(run.name)
     }
     return {**shared, **per_run}
 
 
 def own_values(experiment: Experiment, runs: Sequence[Run]) -> PerRun:
-    """The unknowns with one value for each of `runs`, at their start."""
+    """The unknowns with one value for each of `runs`, at their start; of a run that has none, the experiment's value."""
     per_run = [unknown for unknown in experiment.unknowns if unknown.per_run]
-    start = jnp.asarray(np.tile([unknown.start for unknown in per_run], (len(runs), 1)), dtype=float)
-    return PerRun(tuple(unknown.name for unknown in per_run), tuple(run.name for run in runs), start)
+    known = experiment.base_values
+    start = [[one.start if one.of(run.name) else known[one.name] for one in per_run] for run in runs]
+    single = tuple(unknown.name for unknown in per_run if unknown.runs is not None)
+    names = tuple(unknown.name for unknown in per_run)
+    whole = jnp.asarray(start, dtype=float).reshape(len(runs), len(names))
+    return PerRun(names, tuple(run.name for run in runs), whole, single)
 
 
 def declared_problem(experiment: Experiment, runs: Sequence[Run]) -> Problem:

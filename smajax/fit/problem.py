@@ -50,11 +50,12 @@ class FitTask(NamedTuple):
 
 
 class PerRun(eqx.Module):
-    """Parameters that have one value for each run."""
+    """Parameters that have one value for each run; of those in `single` some runs alone, and no others, have one that is fitted."""
 
     names: tuple[str, ...] = eqx.field(static=True)
     runs: tuple[str, ...] = eqx.field(static=True)
     start: Float[Array, "run parameter"]
+    single: tuple[str, ...] = eqx.field(static=True, default=())
 
     @property
     def full_names(self) -> tuple[str, ...]:

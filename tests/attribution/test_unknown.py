@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
-from smajax.attribution.close_loop import Outcome
 from smajax.attribution.config import AttributionConfig
+from smajax.attribution.context import Outcome
 from smajax.attribution.findings import UnknownTerm, UnknownTermLikelier
 from smajax.attribution.formulas import formulas
 from smajax.attribution.model_fits import Model, Search

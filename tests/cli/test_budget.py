@@ -14,7 +14,7 @@ import pytest
 
 import smajax as sma
 from smajax.attribution import close_loop as stages
-from smajax.attribution.close_loop import Interim
+from smajax.attribution.context import Interim
 from smajax.attribution.findings import CoefficientFinding, Findings, Remaining, Verdict
 from smajax.cli.budget import run_within, without
 from smajax.cli.commands.close_loop import run_close_loop

@@ -55,7 +55,8 @@ class DeclaredPriors:
 class Unknown:
     """A parameter to be found, in the program's own unit (SI, degC, rad): low < high, low <= start <= high.
 
-    per_run: each run has a value of its own. `RUN_STARTS` holds the names that are no parameter's.
+    per_run: each run has a value of its own; where `runs` names some, these alone, and all others have the experiment's.
+    `RUN_STARTS` holds the names that are no parameter's.
     """
 
     name: str
@@ -65,6 +66,11 @@ class Unknown:
     start: float
     per_run: bool = False
     prior: Prior | None = None
+    runs: tuple[str, ...] | None = None
+
+    def of(self, run: str) -> bool:
+        """Whether that run has a value of its own."""
+        return self.per_run and (self.runs is None or run in self.runs)
 
 
 @dataclass(frozen=True)
@@ -164,7 +170,8 @@ class Experiment:
     @property
     def base_values(self) -> dict[str, float]:
         """Values of the base model that are not the presets': of a model file, of priors, known ones, and starts of unknown ones, SI."""
-        starts = {unknown.name: unknown.start for unknown in self.unknowns if unknown.name not in RUN_STARTS}
+        shared = (unknown for unknown in self.unknowns if unknown.runs is None)
+        starts = {unknown.name: unknown.start for unknown in shared if unknown.name not in RUN_STARTS}
         middles = {name: one.base for name, one in self.priors.presets.items() if one.base is not None}
         return {**(self.model_file.values if self.model_file else {}), **middles, **self.parameters, **starts}
 

@@ -14,7 +14,9 @@ LEAST = 4.0  # noises: an increment that is smaller leaves no gaps
 FEWEST = 3  # levels over the stroke
 CELL = 0.5  # noises: of the cells into which the scale is cut
 ON_LEVELS = 0.75  # of the periodogram: normal noise about levels 8.3 noises apart, exp(-2 pi^2 / 8.3^2)
-CHANCE = 0.01  # of readings that lie anywhere, at most, to look like that at any increment from the largest to the one found
+CHANCE = (
+    0.01  # of readings that lie anywhere, at most, to look like that at any increment from the largest to the one found
+)
 FINENESS = 8  # frequencies looked at per turn over the whole stroke
 MOST = 20_000  # of them
 BLOCK = 64  # at a time
