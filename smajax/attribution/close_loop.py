@@ -157,7 +157,7 @@ def prepared(  # the stage's inputs, each once
     values = dict(zip(job.problem.names, base.values.tolist(), strict=True))
     setting.presets = visible(at_fit, values, job.presets)
     identifiable = identifiability(at_fit, job.unknowns, job.bounds, TakenAt.BASE_FIT)
-    checks = Checks(identifiable, hidden_by_one_force=job.hidden_by_one_force)
+    checks = Checks(identifiable, hidden_by_one_force=job.hidden_by_one_force, freed_later=tuple(setting.presets))
     progress(Stage(CHECKING, 1.0))
     progress(Result(checks))
     context = Context(job, setting, start, base, seed, checks, interim, record_errors)

@@ -52,6 +52,7 @@ class Checks:
     unused_priors: bool = False  # the file gives priors that nothing here uses
     held_presets: tuple[str, ...] = ()  # values that the file does not give, held at those of the presets
     hidden_by_one_force: tuple[str, ...] = ()  # effects that only runs under another load could show
+    freed_later: tuple[str, ...] = ()  # values that the file does not give, held here and fitted by what follows
 
 
 def _correlated(covariance: np.ndarray, names: Sequence[str]) -> tuple[CorrelatedGroup, ...]:

@@ -47,6 +47,11 @@ def check_events(checks: Checks) -> Iterator[Event]:
 
 def _determined(checks: Checks) -> Iterator[str]:
     yield from identifiability_sentences(checks.identifiable)
+    if checks.freed_later:
+        yield (
+            f"That is with {listed(checks.freed_later)} at the presets' values. The file does not give them, so the search fits them as well: what these runs "
+            "then determine of each is said beside its value."
+        )
     if checks.held_presets:
         yield (
             f"The file does not give {listed(checks.held_presets)}: held at the values of the presets, or at the base that [priors.presets] has. "

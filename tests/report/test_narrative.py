@@ -158,6 +158,19 @@ def test_each_cluster_of_correlated_parameters_has_one_line_with_advice() -> Non
     (advice,) = [one for one in limits if one.startswith("Of density these runs determine combinations alone.")]
     assert "`smajax identify experiment.toml --design`" in advice
     assert any(one.startswith("damping: determined by its prior") for one in limits)
+    assert not any("scale of the wire's temperature" in one for one in limits)
+
+
+def test_an_open_scale_of_temperature_is_said_to_need_more_than_another_load() -> None:
+    def found(name: str, unit: str) -> ParameterFinding:
+        remark = Remark(RemarkKind.COMBINATION, ("specific_heat",))
+        return ParameterFinding(name, unit, 1.0, None, 0.0, 2.0, 1.0, remark)
+
+    after = (found("convection_coefficient", "W/(m^2 K)"), found("austenite_start", "degC"))
+    limits = narrate(dataclasses.replace(made_findings(), after=after)).cannot_know
+    (said,) = [one for one in limits if "scale of the wire's temperature" in one]
+    assert said.startswith("austenite_start is open together with the convection")
+    assert "A measured temperature of the wire, runs in air of another temperature" in said
 
 
 @pytest.mark.parametrize("widths", [4.9, -31.2, None])
@@ -341,11 +354,13 @@ def test_progress_of_the_search_is_a_message() -> None:
 def test_the_checks_before_a_fit_are_messages_and_a_prior_without_use_is_a_warning() -> None:
     events: list[Event] = []
     found = Identifiability(("a", "b"), 500, 2)
-    narrated(events.append)(Result(Checks(found, unused_priors=True, held_presets=("c",))))
-    assert [type(one) for one in events] == [WarningMessage, Message, Message]
+    narrated(events.append)(Result(Checks(found, unused_priors=True, held_presets=("c",), freed_later=("d",))))
+    assert [type(one) for one in events] == [WarningMessage, Message, Message, Message]
     assert [one.text for one in events if isinstance(one, Message)] == [
         "check: All 2 unknowns are identifiable from these runs (Jacobian of 500 samples, rank 2), each by itself as far as the correlations at "
         "the fit allow.",
+        "check: That is with d at the presets' values. The file does not give them, so the search fits them as well: what these runs then determine "
+        "of each is said beside its value.",
         "check: The file does not give c: held at the values of the presets, or at the base that [priors.presets] has. `--presets fitted` fits them "
         "too, within what data sheets leave open, as close-loop does.",
     ]

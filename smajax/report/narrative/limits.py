@@ -69,6 +69,13 @@ def _remarks(findings: Findings) -> Iterator[str]:
             f"Of {and_listed(blended)} these runs determine combinations alone. {separated(findings)} Where the equations have their "
             "product alone (density and specific heat) no run separates them."
         )
+    degrees = [one.name for one in findings.after if one.unit == "degC" and one.name in blended]
+    if degrees and "convection_coefficient" in blended:
+        yield (
+            f"{and_listed(degrees)} {'is' if len(degrees) == 1 else 'are'} open together with the convection because the scale of the wire's temperature over the air's is: with convection, specific "
+            "heat and stress slopes changed alike the output is the same, under every load and however slow the run. A measured temperature of the "
+            "wire, runs in air of another temperature, or one of these values known tells it."
+        )
 
 
 def _weak_test(findings: Findings) -> Iterator[str]:
