@@ -91,6 +91,9 @@ def test_a_mass_in_a_file_name_is_suggested_with_the_option_that_takes_it(tmp_pa
     assert ended.code == 0, ended.said
     assert [float(run.inputs["mass"][0]) for run in load_experiment(out, CATALOGUE).runs] == [0.3, 0.5]
     assert "load_mass" not in ended.out
+    ended = smajax("new-experiment", *files, "--mass", "step_300g=0.3 g,step_500g=0.5 g", "--overwrite", "--out", out)
+    assert "warning: the mass is no more than 0.0005 kg; is it in kg, and not in g?" in ended.out
+    assert [float(run.inputs["mass"][0]) for run in load_experiment(out, CATALOGUE).runs] == [0.3e-3, 0.5e-3]
 
 
 def test_a_coupon_is_ranked_too(tmp_path: Path) -> None:

@@ -62,7 +62,7 @@ def new_experiment(
         list[str] | None,
         typer.Option(
             "--mass",
-            help="hanging mass, of an arm its payload, where no column has it: '500 g' of all runs, RUN='1 kg' of one; may be repeated",
+            help="hanging mass, of an arm its payload, where no column has it: '500 g' of all runs, RUN='1 kg' of one, several after commas; may be repeated",
         ),
     ] = None,
     runs_of: Annotated[
@@ -138,9 +138,9 @@ def _check_options(out: Path, overwrite: bool, twice: bool) -> None:
 
 
 def _masses(several: Sequence[str]) -> tuple[dict[str, str], str]:
-    """(by run: `RUN=500 g`, once a run, whose name may hold anything; of all other runs: `500 g`)."""
+    """(by run: `RUN=500 g`, once a run, whose name may hold anything; of all other runs: `500 g`). Several may stand after commas."""
     result: dict[str, str] = {}
-    for one in several:
+    for one in (part for text in several for part in _after_commas(text)):
         run, sign, value = (part.strip() for part in one.rpartition("="))
         bare = not sign and value.lstrip("+.")[:1].isdigit()
         if not (bare or (run and value)) or run in result:
@@ -149,6 +149,12 @@ def _masses(several: Sequence[str]) -> tuple[dict[str, str], str]:
             )
         result[run] = value
     return result, result.pop("", "")
+
+
+def _after_commas(text: str) -> list[str]:
+    """`a=1 kg,b=2 kg` as two; a comma in a name or in a number (`2,5 kg`) divides nothing."""
+    parts = text.split(",")
+    return parts if all("=" in part for part in parts) else [text]
 
 
 def _print(messages: Sequence[str], loaded: DraftFile, out: Path, ranked: bool) -> None:

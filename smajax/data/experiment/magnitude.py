@@ -33,6 +33,7 @@ WARMS = 5.0  # K above the air: less transforms nothing
 LARGEST_STROKE, SMALLEST_STROKE = 0.3, 1e-4
 COLDEST_IN_K = 200.0  # degC: where a record never falls below, it is of a furnace, or in kelvin
 WARMEST_AIR = 60.0  # degC
+LIGHTEST = 2e-3  # kg: 40 MPa in a wire of 25 um, the finest that is sold, and less than 1 MPa in one of 0.15 mm
 COLDEST = -100.0  # degC: no bench is colder, but for one whose degC are declared to be K
 IN_COMMON = 0.9
 FOLLOWS, LEAST = 0.2, 20  # rank correlation of heat and output; samples
@@ -64,6 +65,9 @@ def _size_warnings(runs: Sequence[ReadRun]) -> list[str]:
         if ends is not None and max(map(abs, ends)) > most:
             size = f"{max(map(abs, ends)):.5g} {own}".strip()
             result.append(f"the {name} reaches {size}; is it in {other}?")
+    mass = _extremes(runs, "mass")
+    if mass is not None and 0.0 < mass[1] < LIGHTEST:
+        result.append(f"the mass is no more than {mass[1]:.5g} kg; is it in kg, and not in g?")
     stress = _extremes(runs, "stress")
     if stress is not None and 0.0 < max(map(abs, stress)) < 1e4:
         result.append(f"the stress reaches no more than {max(map(abs, stress)):.5g} Pa; is it in MPa?")
