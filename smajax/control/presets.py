@@ -29,6 +29,7 @@ from smajax.control.scales import is_arm
 from smajax.core.names import close_matches, listed
 from smajax.core.parameters import set_parameters
 from smajax.core.plugins import resolved
+from smajax.core.provenance import code_mark
 from smajax.model.load.arm import Arm
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System
@@ -338,3 +339,9 @@ def check_controller(name: str, system: System) -> None:
         able = controllers_for(system)
         who = f"controllers that work on it: {listed(able)}" if able else "no controller works on it"
         raise ValueError(f"controller `{name}` cannot lead the load {type(system.load).__name__}: {lacking}; {who}.")
+
+
+def code_of_parts(controller: str, estimator: str = "") -> str:
+    """Digest of what a controller and a filter of these names do, also of ones that a script puts into `CONTROLLERS` and `FILTERS`."""
+    parts = [CONTROLLERS[controller], *([FILTERS[estimator]] if estimator else [])]
+    return code_mark(f"The controller {controller}" + (f" or the filter {estimator}" if estimator else ""), *parts)

@@ -200,6 +200,8 @@ def on_amplifier(controller: Module, system: System, own: frozenset[str]) -> Mod
     limit, known = _limit(system)
     table = parameters(controller)
     names = [one for one in table if table[one].unit == "V" and not {one, str(table[one].path[0])} & own]
+    if not names:
+        return controller
     values = dict(zip(names, get_parameters(controller, names), strict=True))
     put = {
         name: limit if name == "largest_voltage" else one * share_of_limit(name, limit) for name, one in values.items()

@@ -7,6 +7,8 @@ import json
 import os
 import platform
 import subprocess
+import uuid
+import warnings
 from collections.abc import Sequence
 from functools import lru_cache
 from importlib import metadata
@@ -18,9 +20,11 @@ import jax
 import numpy as np
 
 from smajax.core import plugins
+from smajax.core.own_code import UnreadableCodeError, code_digest, own_parts
 from smajax.core.parameters import parameter_values
 
 PACKAGES = ("smajax", "jax", "jaxlib", "equinox", "numpy")
+NOT_READ = "{} cannot be read ({}): work that was kept in a folder cannot be known to be of the same code, and is not used again."
 FIT_PACKAGES = ("smajax", "jax", "equinox", "numpy", "optimistix", "scipy")
 
 
@@ -67,9 +71,27 @@ def versions() -> dict[str, str]:
     return {name: metadata.version(name) for name in PACKAGES} | {"python": platform.python_version()}
 
 
+class UnreadableCodeWarning(UserWarning):
+    """Code of a part that cannot be read: kept work is not used again."""
+
+
+def code_mark(what: str, *things: Any) -> str:
+    """Digest of the code and the values of parts that may be the user's (`own_code`).
+
+    Of what cannot be read, which `what` names in a warning, it is another one at every call, so that no kept work is found by it.
+    """
+    try:
+        return code_digest(*things)
+    except UnreadableCodeError as error:
+        warnings.warn(NOT_READ.format(what, error), UnreadableCodeWarning, stacklevel=3)
+        return uuid.uuid4().hex
+
+
 def digest(model: Any, more: Sequence[str | np.ndarray] = ()) -> str:
-    """Hex digest of the code, of the structure and the numbers of `model`, and of `more`."""
+    """Hex digest of the code, also of classes and functions in `model` that are not of the package, of the structure and the numbers of `model`, and of `more`."""
     mark = hashlib.sha256(f"{source_mark()} {plugins.versions() or ''} {jax.tree.structure(model)}".encode())
+    for part in own_parts(model):
+        mark.update(code_mark(f"The code of {getattr(part, '__qualname__', part)}", part).encode())
     for leaf in (*jax.tree.leaves(model), *more):
         mark.update(leaf.encode() if isinstance(leaf, str) else np.ascontiguousarray(leaf).tobytes())
     return mark.hexdigest()

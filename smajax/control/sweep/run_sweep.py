@@ -21,7 +21,7 @@ from smajax.control.least_time import LIMITS, Distance, command_limit, distance
 from smajax.control.mismatch import MISMATCHES, default_mismatches
 from smajax.control.plants import Plants, PlantSet, carrying, plant_set
 from smajax.control.position_unit import PositionUnit, check_unit, default_set_points, unit_named, unit_of
-from smajax.control.presets import CONTROLLERS, check_controller, controllers_for
+from smajax.control.presets import CONTROLLERS, check_controller, code_of_parts, controllers_for
 from smajax.control.reference import clock
 from smajax.control.scales import is_arm, seconds_for
 from smajax.control.signal_path import between_in_words, check_interface, check_set_points, default_noise, interface_of
@@ -274,12 +274,12 @@ def _sweep(
 ) -> ControllerSweep:
     """shared: the largest command of all controllers of the sweep."""
     preset = CONTROLLERS[name]
-    plant = preset.plant(system)
     tuned = tuple(gains for gains in settings.tuned if gains.controller == name)
     # What an older version cached has no least times.
     key = digest(
-        plant,
+        _plant_and_controller(system, name, settings),
         [
+            code_of_parts(name, settings.estimator),
             f"{WITH_LEAST_TIMES} {shared:g}",
             str(dataclasses.replace(settings, controllers=(name,), tuned=tuned)),
             *plants.marks,

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from smajax.control.plants import Plants
-from smajax.control.presets import CONTROLLERS
+from smajax.control.presets import CONTROLLERS, code_of_parts
 from smajax.control.tune.cma_es import CmaEsState
 from smajax.control.tune.cma_es import load as load_evolution
 from smajax.control.tune.folder_names import FILES, FINISH, SETTINGS, STATE
@@ -24,7 +24,10 @@ from smajax.model.system import System
 def settings_record(system: System, settings: TuneSettings, plants: Plants | None = None) -> dict[str, Any]:
     """What distinguishes this tuning from another: settings, code and plant. ValueError for settings that make no sense."""
     found = settings.check(system, plants)
-    mark = digest(CONTROLLERS[settings.controller].plant(system), found.marks)[:16]
+    preset = CONTROLLERS[settings.controller]
+    plant = preset.plant(system)
+    parts = code_of_parts(settings.controller, settings.estimator)
+    mark = digest((plant, preset.make(plant)), [*found.marks, parts])[:16]
     return dict(json.loads(json.dumps({**settings.record(), "code": mark})))
 
 
@@ -47,7 +50,9 @@ def check_folder(out: Path, record: Mapping[str, object]) -> None:
         differences = "; ".join(
             f"{name}: {before.get(name)} there, {record.get(name)} requested" for name in differ if name != "code"
         )
-        differences = differences or "it was started by another version of smajax or on another plant"
+        differences = differences or (
+            "it was started by another version of smajax, on another plant, or with other code or values of the controller or the filter"
+        )
         raise ValueError(f"--out {out} holds another tuning ({differences}): give another folder, or delete that one.")
 
 
