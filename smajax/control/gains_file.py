@@ -19,7 +19,7 @@ from dataclasses import replace as replaced
 from pathlib import Path
 from typing import Any
 
-from smajax.control.controllers.base import AbstractController
+from smajax.control.controllers.base import AbstractController, limits_of
 from smajax.control.loop_settings import NOT_KNOWN, LoopSettings, is_number, read_settings
 from smajax.control.presets import CONTROLLERS, check_controller
 from smajax.control.scales import unit_on
@@ -29,7 +29,6 @@ from smajax.core.parameters import check_bounds, parameter_values, parameters, s
 from smajax.model.system import System
 
 FORMAT = "smajax gains 1"
-LARGEST = "largest_voltage"  # of a controller that limits its command
 
 
 class GainsFileError(ValueError):
@@ -54,10 +53,10 @@ class Gains:
         table = parameters(CONTROLLERS[self.controller].make(system))
         return {name: unit_on(entry.unit, system) for name, entry in table.items()}
 
-    def without_limit(self) -> Gains:
-        """The same, whose limit of the command is that of the plant that it is put on."""
-        loop = replaced(self.loop, command_limit=None)
-        return replaced(self, fixed={name: one for name, one in self.fixed.items() if name != LARGEST}, loop=loop)
+    def without_limit(self, system: System) -> Gains:
+        """The same, whose limit of the command is that of the plant that it is put on, `system` or another one."""
+        loop, limits = replaced(self.loop, command_limit=None), limits_of(CONTROLLERS[self.controller].make(system))
+        return replaced(self, fixed={name: one for name, one in self.fixed.items() if name not in limits}, loop=loop)
 
     def put(self, system: System) -> AbstractController:
         """The controller's preset on `system`, the plant that it believes in, with these gains.

@@ -18,10 +18,9 @@ from jaxtyping import Array, Float
 from smajax.control.closed_loop import ClosedLoopSetup
 from smajax.control.controllers.base import AbstractController
 from smajax.control.figures_of_merit import evaluated_loop
-from smajax.control.gains_file import LARGEST
 from smajax.control.measured_state import MeasuredState
 from smajax.control.reference import Reference, clock, constant
-from smajax.core.parameters import parameter, parameter_values
+from smajax.core.parameters import parameter
 from smajax.model.system import System
 from smajax.model.types import Scalar
 
@@ -29,7 +28,7 @@ from smajax.model.types import Scalar
 class Largest(AbstractController):
     """The largest command while the position is below the set point at the start, none while it is above."""
 
-    largest_voltage: Scalar = parameter("V", 0.0, 1e4, "largest command; the smallest is zero")
+    largest_voltage: Scalar = parameter("V", 0.0, 1e4, "largest command; the smallest is zero", limits_command=True)
 
     def start(self, measured: MeasuredState, wanted: Reference) -> Scalar:
         return jnp.where(wanted.position >= measured.position, 1.0, 0.0)
@@ -58,13 +57,12 @@ def least_reach_times(
     return np.asarray(_reach_times(system, Largest(largest_voltage), targets, clock(seconds, dt)))
 
 
-LIMITS = (LARGEST, "high_voltage")  # parameters that limit the command of a controller; the second of one that switches
-
-
 def command_limit(system: System, controller: AbstractController) -> float:
-    """Largest command that the controller may give and the drive follows, in the unit of the drive's command; infinite where neither has a limit."""
-    own = parameter_values(controller)
-    return min(float(system.drive.largest_command()), *(own.get(name, math.inf) for name in LIMITS))
+    """Largest command that the controller may give and the drive follows, in the unit of the drive's command; infinite where neither has a limit.
+
+    That of a controller is its `largest_command()`.
+    """
+    return min(float(system.drive.largest_command()), float(controller.largest_command()))
 
 
 class Distance(NamedTuple):

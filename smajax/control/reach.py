@@ -9,13 +9,12 @@ from typing import NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.control.controllers.base import AbstractController
-from smajax.control.gains_file import LARGEST
+from smajax.control.controllers.base import AbstractController, limits_of
 from smajax.control.load_equation import moving_load, stroke_of
 from smajax.control.position_unit import SHARES, PositionUnit, band_shown, unit_of
 from smajax.control.scales import seconds_for
 from smajax.core.display_units import digits
-from smajax.core.parameters import parameter_values, parameters
+from smajax.core.parameters import parameters
 from smajax.model.system import System
 from smajax.simulation.compiled import simulate_compiled
 
@@ -33,6 +32,7 @@ class Reach(NamedTuple):
     command: float
     unit: PositionUnit
     by_drive: bool = True  # whether the largest command is the drive's; False: the controller's own
+    parameters: tuple[str, ...] = ()  # of the controller, which limit its command
 
     def words(self) -> str:
         """`with up to 5 V this load comes to rest between 0 and 12.3 mm`."""
@@ -47,8 +47,8 @@ def reach_of(system: System, controller: AbstractController | None = None) -> Re
     limit, or the load follows an input.
     """
     load = moving_load(system)
-    own = {} if controller is None else parameter_values(controller)
-    of_drive, of_controller = float(system.drive.largest_command()), own.get(LARGEST, math.inf)
+    of_drive = float(system.drive.largest_command())
+    of_controller = math.inf if controller is None else float(controller.largest_command())
     largest = min(of_drive, of_controller)
     if not math.isfinite(largest) or load.inputs_required:
         return None
@@ -61,8 +61,9 @@ def reach_of(system: System, controller: AbstractController | None = None) -> Re
     if not np.isfinite(ends).all():
         return None
     unit = unit_of(system)
+    limiting = () if controller is None else tuple(limits_of(controller))
     low, high = float(unit.of(np.min(ends))), float(unit.of(np.max(ends)))
-    return Reach(low, high, largest, unit, of_drive <= of_controller)
+    return Reach(low, high, largest, unit, of_drive <= of_controller, limiting)
 
 
 def shared_set_points(systems: Iterable[System], count: int) -> tuple[float, ...]:
@@ -112,5 +113,5 @@ def _raised(reach: Reach, system: System) -> str:
     table = parameters(system.drive)
     options = [f"--set {name}=..." for name in ("amplifier_limit", "supply_voltage") if name in table]
     if not reach.by_drive:
-        options.append("largest_voltage of the gains file (--gains, --start)")
+        options.extend(f"{name} of the gains file (--gains, --start)" for name in reach.parameters)
     return " or ".join(options)

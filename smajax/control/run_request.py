@@ -266,7 +266,7 @@ def _assumed(request: RunRequest, loop: LoopRequest) -> _Assumed:
             f"no controller {gains.controller!r}{close_matches(gains.controller, CONTROLLERS, 'there are')}"
         )
     check_controller(gains.controller, bare)
-    gains = gains.without_limit() if gives_limit(request.values) else gains
+    gains = gains.without_limit(bare) if gives_limit(request.values) else gains
     merged = joined({gains.controller: gains.loop}, loop.given)
     system, limit = request.plant(merged.command_limit)
     system = CONTROLLERS[gains.controller].plant(system)

@@ -204,7 +204,7 @@ def on_amplifier(controller: Module, system: System, own: frozenset[str]) -> Mod
         return controller
     values = dict(zip(names, get_parameters(controller, names), strict=True))
     put = {
-        name: limit if name == "largest_voltage" else one * share_of_limit(name, limit) for name, one in values.items()
+        name: limit if table[name].limits_command else one * share_of_limit(name, limit) for name, one in values.items()
     }
     return set_parameters(controller, {name: jnp.where(known, put[name], one) for name, one in values.items()})
 

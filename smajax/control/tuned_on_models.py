@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -53,6 +54,7 @@ class TunedOnModel:
     gains: Gains
     units: Mapping[str, str]
     loops: tuple[EvaluatedLoop, ...]
+    largest: float = math.inf  # command of the controller, in the drive's unit; infinite where it does not say
 
     @property
     def settling_time(self) -> float:
@@ -133,7 +135,7 @@ def tuned_on_models(
         gains = replace(found.after, values=best_gains(assumed, settings, pool, plants=plants))
         own = gains.put(CONTROLLERS[controller].plant(assumed))
         loops = tuple(loop_on_plant(truth, own, float(target), seconds) for target in unit.to_own(np.asarray(targets)))
-        tuned.append(TunedOnModel(name, gains, found.units, loops))
+        tuned.append(TunedOnModel(name, gains, found.units, loops, float(own.largest_command())))
     return ControlComparison(controller, plant[0], unit, seconds, tuple(tuned), differing(first, plant[1]))
 
 

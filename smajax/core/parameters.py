@@ -23,15 +23,17 @@ def _as_float_array(value: Any) -> Any:
     return value if isinstance(value, jax.core.Tracer) else jnp.asarray(value, dtype=float)
 
 
-def parameter(unit: str, low: float, high: float, about: str, of_load: str = "", **kwargs: Any) -> Any:
+def parameter(
+    unit: str, low: float, high: float, about: str, of_load: str = "", limits_command: bool = False, **kwargs: Any
+) -> Any:
     """A dataclass field for one physical parameter.
 
     `unit` is SI with temperatures in C; `low` and `high` are the widest values that make physical sense (the bounds
     within which the simulator promises finite results); `about` is one line for tables and reports. `of_load`: what of the load it is measured
     as, `reading`, `reading rate` or `force`; its unit in a system is then that of the system's load (`System.units_of_load`), and `unit`
-    that of a load whose position is a length.
+    that of a load whose position is a length. `limits_command`: of a controller, that it never asks for a larger command than this.
     """
-    metadata = {"unit": unit, "low": low, "high": high, "about": about, "of_load": of_load}
+    metadata = {"unit": unit, "low": low, "high": high, "about": about, "of_load": of_load, "limits": limits_command}
     return eqx.field(converter=_as_float_array, metadata=metadata, **kwargs)
 
 
@@ -46,6 +48,7 @@ class Parameter:
     about: str
     path: tuple[str | int, ...]
     also: str = ""  # the unit of its field where the load has another: files of before give the same number in it
+    limits_command: bool = False  # of a controller, which never asks for a larger command
 
 
 def parameters(model: eqx.Module) -> dict[str, Parameter]:
@@ -75,7 +78,8 @@ def parameters(model: eqx.Module) -> dict[str, Parameter]:
                 meta = entry.metadata
                 unit = of_load.get(meta["of_load"], meta["unit"])
                 also = meta["unit"] if unit != meta["unit"] else ""
-                result[name] = Parameter(name, unit, meta["low"], meta["high"], meta["about"], here, also)
+                limits = meta.get("limits", False)
+                result[name] = Parameter(name, unit, meta["low"], meta["high"], meta["about"], here, also, limits)
             else:
                 walk(getattr(node, entry.name), here, prefix)
 

@@ -53,7 +53,7 @@ def controller_source(
     and ValueError as `loop_around`.
     """
     found = read_gains(gains, system)
-    found = found.without_limit() if own_limit else found
+    found = found.without_limit(system) if own_limit else found
     used = joined({found.controller: found.loop}, LoopSettings(period=period, delay=delay, estimator=estimator))
     if not 0.0 < used.period < math.inf or used.delay < 0:
         raise ExportError(

@@ -19,7 +19,8 @@ from smajax.core.wording import and_listed, counted
 
 
 def limit_words(loop: LoopSettings, largest: float | None = None) -> str:
-    """Up to which command the loop goes, and by which of its two limits. largest: the controller's own, in the command's unit."""
+    """Up to which command the loop goes, and by which of its two limits. largest: the controller's own, in the command's unit; None or infinite where it says none."""
+    largest = None if largest is None or math.isinf(largest) else largest
     limits = {"controller": largest, "drive": loop.command_limit}
     known = {of: f"{digits(one, 4)} {loop.command_unit}" for of, one in limits.items() if one is not None}
     if largest is None or loop.command_limit is None or known["controller"] == known["drive"]:

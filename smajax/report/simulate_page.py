@@ -14,7 +14,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from smajax.control.figures_of_merit import band_of
-from smajax.control.gains_file import LARGEST, fixed_parameters
+from smajax.control.gains_file import fixed_parameters
 from smajax.control.presets import CONTROLLERS
 from smajax.control.run_result import RunResult
 from smajax.control.scales import unit_on
@@ -219,7 +219,7 @@ def settings_rows(result: RunResult) -> list[list[str]]:
     table_of, values = parameters(controller), parameter_values(controller)
     shown = [*CONTROLLERS[name].box, *fixed_parameters(name, controller)]
     gains = [[one, f"{digits(values[one], 4)} {unit_on(table_of[one].unit, result.system)}"] for one in shown]
-    return [*loop_rows(loop, values.get(LARGEST)), *gains]
+    return [*loop_rows(loop, float(controller.largest_command())), *gains]
 
 
 def page(

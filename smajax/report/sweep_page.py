@@ -140,7 +140,7 @@ def _distance_cell(found: Distance | None) -> str:
 
 
 LEAST_TIME = (
-    "The least time is that in which the largest command of all controllers here is first there, at the same set point on the same plant; none of them is "
+    "The least time is that in which the largest command of all controllers here that say theirs is first there, at the same set point on the same plant; none of them is "
     "there earlier. Set points that it does not reach are out of reach of the plant, which is no failure of a controller. Settling time over least time: median / "
     "worst of the set points at which the controller settles; 1 is the best that is possible. Once more with the largest command of the controller itself."
 )
@@ -206,7 +206,7 @@ def page(
         _panels(pictures, "comparison.png", "figures of merit over the set point"),
         f"{bullets(conclusions(results))}<p>The unperturbed plant, "
         f"{len(settings.set_points)} set points from {low:{precision}}{unit.symbol} to {high:{precision}}{unit.symbol}; "
-        f"median / worst over the set points. {arrived} {say(settings.between)}</p><p>{say(LEAST_TIME)}</p>{bullets(remarks.settings)}",
+        f"median / worst over the set points. {arrived} {say(settings.between)}</p><p>{say(LEAST_TIME)}</p>{bullets([*limit_sentences(results), *remarks.settings])}",
         table(head, comparison_rows(results)),
         section(steps),
         _what_differs(results, drawn_as),
@@ -257,6 +257,26 @@ def conclusions(results: SweepResults) -> list[str]:
         )
         sentences.append(f"{nominal} {perturbed_sentence(results.grid, one)}")
     return sentences
+
+
+def limit_sentences(results: SweepResults) -> tuple[str, ...]:
+    """Of each controller that does not say its largest command: its times over the least ones are not those of the others."""
+    sentences = []
+    for one in results.sweeps:
+        if one.says_limit:
+            continue
+        limit = one.own_least.limit
+        times = (
+            f"its least times are with the drive's limit of {limit:.4g} {results.unit.command}, and its settling times over these are not to be "
+            "compared with those of the others"
+            if np.isfinite(limit)
+            else "nor has the drive a limit, so that it has no least times"
+        )
+        sentences.append(
+            f"{one.name} does not say its largest command: {times}. Give the parameter that limits it `limits_command=True`, or the controller "
+            "the method `largest_command`."
+        )
+    return tuple(sentences)
 
 
 class Ranked(NamedTuple):

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from smajax.control.least_time import Distance
-from smajax.control.sweep.run_sweep import ControllerSweep, LeastTimes, SweepResults
+from smajax.control.sweep.least_times import LeastTimes
+from smajax.control.sweep.run_sweep import ControllerSweep, SweepResults
 from smajax.core.provenance import made_with
 from smajax.report.sweep_numbers import comparison_digest, digest_of, lines_digest, map_numbers, nominal_gain
 from smajax.report.sweep_page import NO_REMARKS, Remarks, answer, conclusions

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from smajax.control.gains_file import LARGEST
 from smajax.control.tune.moves import Moves
 from smajax.control.tune.scenarios import BEYOND
 from smajax.control.tune.terms import TERMS, Term, terms_in
@@ -247,7 +246,7 @@ def _figures(result: TuningResult, check: Check) -> list[list[str]]:
 def settings_rows(result: TuningResult) -> list[list[str]]:
     """What shapes the gains and was not tuned: the loop that they were tuned in, and the controller's other parameters."""
     fixed = [[name, f"{digits(one, 4)} {result.units[name]}"] for name, one in result.after.fixed.items()]
-    return [*loop_rows(result.after.loop, result.after.fixed.get(LARGEST)), *fixed]
+    return [*loop_rows(result.after.loop, result.largest), *fixed]
 
 
 def page(result: TuningResult, pictures: Mapping[str, bytes], command: str, steps: Sequence[Step] = ()) -> str:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from smajax.control.gains_file import LARGEST, write_gains
+from smajax.control.gains_file import write_gains
 from smajax.control.tuned_on_models import ControlComparison, TunedOnModel
 from smajax.core.display_units import digits, label
 from smajax.core.files import json_text, replace
@@ -153,7 +153,7 @@ def loop_plots(result: ControlComparison) -> list[SeriesPlot]:
 
 def _settings(result: ControlComparison) -> list[list[str]]:
     """A row a setting of the loop and a parameter that was not tuned, a column a model."""
-    loops = [loop_rows(one.gains.loop, one.gains.fixed.get(LARGEST)) for one in result.tuned]
+    loops = [loop_rows(one.gains.loop, one.largest) for one in result.tuned]
     rows = [[several[0][0], *(one[1] for one in several)] for several in zip(*loops, strict=True)]
     for name in result.tuned[0].gains.fixed:
         values = [f"{digits(one.gains.fixed[name], 4)} {one.units[name]}" for one in result.tuned]

@@ -9,7 +9,6 @@ from cmaes import CMA
 from scipy.stats import qmc
 
 from smajax.control.controllers.preset import Box
-from smajax.control.gains_file import LARGEST
 from smajax.control.least_time import Largest
 from smajax.control.presets import CONTROLLERS
 from smajax.control.signal_path import interface_of
@@ -59,7 +58,7 @@ def least_times(
 
     section: makes the plant of a section of the source from the arm, as `ControllerPreset.plant` does.
     """
-    return batched_least_times(LoopSetup(section(arm()), Largest(limit), LARGEST, LONGEST, STEP), rows, limit)
+    return batched_least_times(LoopSetup(section(arm()), Largest(limit), "largest_voltage", LONGEST, STEP), rows, limit)
 
 
 def costs(exact: np.ndarray, least: np.ndarray | None = None, quick: float = 0.0) -> np.ndarray:

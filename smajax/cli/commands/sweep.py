@@ -54,7 +54,7 @@ def _tuned(files: Sequence[Path], options: PlantOptions) -> tuple[Gains, ...]:
     except GainsFileError as error:
         hint = " Ratios of the main gain are `--gain-ratios`." if any(not one.suffix for one in files) else ""
         raise typer.BadParameter(f"{error}{hint}", param_hint="--gains") from None
-    return tuple(one.without_limit() for one in tuned) if options.gives_limit else tuned
+    return tuple(one.without_limit(bare) for one in tuned) if options.gives_limit else tuned
 
 
 @dataclass(frozen=True)
@@ -232,7 +232,7 @@ def sweep(
     from smajax.control.sweep.run_sweep import begun_sweep, may_resume, sweep_controllers
     from smajax.core.provenance import digest
     from smajax.report.sweep_folder import as_text, files_of, write_sweep
-    from smajax.report.sweep_page import Remarks, answer
+    from smajax.report.sweep_page import Remarks, answer, limit_sentences
 
     tuned = _tuned(tuple(gains or ()), plant)
     given = LoopSettings(period=period, delay=delay, estimator=estimator)
@@ -293,6 +293,8 @@ def sweep(
     else:
         typer.echo(answer(results))
         typer.echo(as_text(results))
+        for sentence in limit_sentences(results):
+            typer.echo(sentence)
         typer.echo(f"Page: {page.resolve()}")
     if open_page:
         browse(page)

@@ -74,14 +74,15 @@ def _initial_gains(start: Path | None, controller: str, plant: System) -> Gains 
 
 def _limit_of(gains: Gains | None, plant: System, given: bool) -> dict[str, float]:
     """The controller's limit of the command in a file of gains, where it is not that of the preset on this plant; none where --set gives one."""
-    from smajax.control.gains_file import LARGEST
+    from smajax.control.controllers.base import limits_of
     from smajax.control.presets import CONTROLLERS
     from smajax.core.parameters import parameter_values
 
-    if gains is None or given or LARGEST not in gains.fixed:
+    if gains is None or given:
         return {}
-    own = parameter_values(CONTROLLERS[gains.controller].make(plant))[LARGEST]
-    return {} if gains.fixed[LARGEST] == own else {LARGEST: gains.fixed[LARGEST]}
+    made = CONTROLLERS[gains.controller].make(plant)
+    own = parameter_values(made)
+    return {name: gains.fixed[name] for name in limits_of(made) if gains.fixed.get(name, own[name]) != own[name]}
 
 
 def _variation(several: Sequence[str] | None, plant: System) -> dict[str, float]:

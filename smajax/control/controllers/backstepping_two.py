@@ -64,7 +64,7 @@ class BacksteppingTwo(AbstractController):
     believed: System
     damping_gain: Scalar = parameter("1/s", 0.0, 1e4, "K: weight of the rate in the stress wanted (eq. 4.70)")
     temperature_gain: Scalar = parameter("1/s", 0.0, 1e4, "K_1: how fast the temperature's error dies out")
-    largest_voltage: Scalar = parameter("V", 0.0, 1e4, "largest command; the smallest is zero")
+    largest_voltage: Scalar = parameter("V", 0.0, 1e4, "largest command; the smallest is zero", limits_command=True)
     edge: Scalar = parameter(
         "-", 1e-12, 0.5, "distance from the ends of arccos from where on its slope is held", default=1e-6
     )

@@ -47,7 +47,7 @@ class FeedforwardPi(AbstractController):
     integral_gain: Scalar = parameter("V/(rad s)", 0.0, 1e6, "K_i")
     path_speed: Scalar = parameter("rad/s", 0.0, 1e4, "v_r: largest speed of the path")
     path_time: Scalar = parameter("s", 1e-3, 1e4, "t_r: time constant with which the path comes to its end")
-    largest_voltage: Scalar = parameter("V", 0.0, 1e4, "upper limit of the command")
+    largest_voltage: Scalar = parameter("V", 0.0, 1e4, "upper limit of the command", limits_command=True)
     derivative_gain: Scalar = parameter("V s/rad", 0.0, 1e6, "K_d; 0: a PI controller", default=0.0)
     rate_filter: Scalar = parameter("s", 0.0, 10.0, "time constant of the velocity's filter", default=0.02)
     braking: Scalar = braking_parameter()

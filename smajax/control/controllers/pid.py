@@ -37,7 +37,7 @@ class Pid(AbstractController):
     proportional_gain: Scalar = parameter("V/rad", 0.0, 1e6, "K_p")
     integral_gain: Scalar = parameter("V/(rad s)", 0.0, 1e6, "K_i")
     derivative_gain: Scalar = parameter("V s/rad", 0.0, 1e6, "K_d")
-    largest_voltage: Scalar = parameter("V", 0.0, 1e4, "upper limit of the command")
+    largest_voltage: Scalar = parameter("V", 0.0, 1e4, "upper limit of the command", limits_command=True)
     smallest_voltage: Scalar = parameter("V", -1e4, 1e4, "lower limit; a heater takes none below zero", default=0.0)
     rate_filter: Scalar = parameter("s", 0.0, 10.0, "time constant of the derivative's filter", default=0.02)
     unwinding_time: Scalar = parameter("s", 0.0, 1e9, "T_t: time in which saturation unwinds the integral", default=1.0)

@@ -120,7 +120,7 @@ class RecedingHorizon(AbstractController):
     """Needs the whole state; `believed` is the plant as the controller knows it, with its effects."""
 
     believed: System
-    largest_voltage: Scalar = parameter("V", 0.0, 1e4, "largest command; the smallest is zero")
+    largest_voltage: Scalar = parameter("V", 0.0, 1e4, "largest command; the smallest is zero", limits_command=True)
     piece_time: Scalar = parameter("s", 1e-4, 1e4, "h: for how long a command of the plan is held")
     velocity_time: Scalar = parameter("s", 0.0, 1e4, "tau_v: weight of the velocity at the end of the horizon")
     beyond_weight: Scalar = parameter("-", 1.0, 1e4, "b: weight of an error that grows, beyond the set point")

@@ -46,7 +46,7 @@ class StressSliding(AbstractController):
     stress_gain: Scalar = parameter("V/Pa", 0.0, 1.0, "proportional gain of the stress controller")
     stress_integral_gain: Scalar = parameter("V/(Pa s)", 0.0, 1.0, "integral gain")
     stress_derivative_gain: Scalar = parameter("V s/Pa", 0.0, 1.0, "derivative gain")
-    largest_voltage: Scalar = parameter("V", 0.0, 1e4, "largest command; the smallest is zero")
+    largest_voltage: Scalar = parameter("V", 0.0, 1e4, "largest command; the smallest is zero", limits_command=True)
     braking: Scalar = braking_parameter()
 
     def start(self, measured: MeasuredState, wanted: Reference) -> StressSlidingMemory:

@@ -17,7 +17,7 @@ class Vsc1(AbstractController):
     It has no useful derivative in its gains: they move the switching times, which are whole control periods.
     """
 
-    high_voltage: Scalar = parameter("V", 0.0, 1e4, "V_high: short of the set point")
+    high_voltage: Scalar = parameter("V", 0.0, 1e4, "V_high: short of the set point", limits_command=True)
     low_voltage: Scalar = parameter("V", 0.0, 1e4, "V_low: beyond it")
 
     def start(self, measured: MeasuredState, wanted: Reference) -> tuple[()]:

@@ -13,7 +13,7 @@ from smajax.model.types import Scalar
 class Vsc2(AbstractController):
     r"""$s = \theta - \theta_d$, with a layer of half thickness phi around s = 0 (`boundary_layer`)."""
 
-    high_voltage: Scalar = parameter("V", 0.0, 1e4, "V_high: short of the layer")
+    high_voltage: Scalar = parameter("V", 0.0, 1e4, "V_high: short of the layer", limits_command=True)
     low_voltage: Scalar = parameter("V", 0.0, 1e4, "V_low: beyond it")
     boundary: Scalar = parameter("rad", 1e-6, 1e3, "phi: half thickness of the layer")
     layer: AbstractLayer = Continuous()

@@ -14,7 +14,7 @@ from smajax.model.types import Scalar
 class Vsc3(AbstractController):
     r"""$s = \dot e + \lambda e$, $e = \theta - \theta_d$. It reads the position only: the velocity is a filtered difference."""
 
-    high_voltage: Scalar = parameter("V", 0.0, 1e4, "V_high: short of the layer")
+    high_voltage: Scalar = parameter("V", 0.0, 1e4, "V_high: short of the layer", limits_command=True)
     low_voltage: Scalar = parameter("V", 0.0, 1e4, "V_low: beyond it")
     surface_slope: Scalar = parameter("1/s", 0.0, 1e3, "lambda: how fast the error dies out on the surface")
     boundary: Scalar = parameter("rad/s", 1e-6, 1e3, "phi: half thickness of the layer")

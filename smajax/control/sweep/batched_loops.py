@@ -17,7 +17,6 @@ import numpy as np
 from smajax.control.closed_loop import ClosedLoopSetup, stored_loop
 from smajax.control.controllers.base import AbstractController
 from smajax.control.figures_of_merit import Merit, evaluated_loop
-from smajax.control.gains_file import LARGEST
 from smajax.control.least_time import Largest
 from smajax.control.perturbed_plant import OF_ARM, Perturbation, perturbed_plant
 from smajax.control.reference import clock, constant
@@ -125,7 +124,7 @@ def least_times(setup: LoopSetup, rows: np.ndarray, largest_command: float) -> n
     Infinite where the plant is not there within the length of a loop; see `least_time`.
     """
     plant_alone = dataclasses.replace(
-        setup, controller=Largest(largest_command), main_gain=LARGEST, interface=IDEAL_INTERFACE
+        setup, controller=Largest(largest_command), main_gain="largest_voltage", interface=IDEAL_INTERFACE
     )
     at_its_gain = np.concatenate([rows[:, :-1], np.ones((len(rows), 1))], axis=1)
     return np.asarray(closed_loops(plant_alone, at_its_gain).merits.reach_time)

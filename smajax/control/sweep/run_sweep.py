@@ -17,7 +17,7 @@ import numpy as np
 from smajax.control.controllers.base import AbstractController
 from smajax.control.figures_of_merit import Merit
 from smajax.control.gains_file import Gains
-from smajax.control.least_time import LIMITS, Distance, command_limit, distance
+from smajax.control.least_time import Distance, command_limit, distance
 from smajax.control.mismatch import MISMATCHES, default_mismatches
 from smajax.control.plants import Plants, PlantSet, carrying, plant_set
 from smajax.control.position_unit import PositionUnit, check_unit, default_set_points, unit_named, unit_of
@@ -25,10 +25,11 @@ from smajax.control.presets import CONTROLLERS, check_controller, code_of_parts,
 from smajax.control.reference import clock
 from smajax.control.scales import is_arm, seconds_for
 from smajax.control.signal_path import between_in_words, check_interface, check_set_points, default_noise, interface_of
-from smajax.control.sweep.batched_loops import LoopSetup, closed_loops, integrated_setup, least_times, positions
+from smajax.control.sweep.batched_loops import LoopSetup, closed_loops, integrated_setup, positions
 from smajax.control.sweep.grid import LEAST, MOST, OF_ARM, PLANT, Grid, loop_rows, sweep_ratios
+from smajax.control.sweep.least_times import LeastTimes, least_times_of
 from smajax.core.files import json_line, writing
-from smajax.core.parameters import get_parameters, set_parameters
+from smajax.core.parameters import get_parameters, parameters, set_parameters
 from smajax.core.progress import Event, Progress, Stage, quiet
 from smajax.core.provenance import digest
 from smajax.core.result_cache import arrays
@@ -149,14 +150,6 @@ def sweep_settings_for(system: System, controllers: Sequence[str] | None = None,
     )
 
 
-class LeastTimes(NamedTuple):
-    """Before which no command within the limit is at the set points, s; infinite: out of reach, NaN: the command has no limit."""
-
-    limit: float  # largest command, in the drive's unit; infinite: none
-    grid: np.ndarray  # of plants and set points, the grid's shape without its last axis: no gain has a part in it
-    nominal: np.ndarray  # of the unperturbed plant, (set points,)
-
-
 @dataclass(frozen=True)
 class ControllerSweep:
     """One controller: figures of merit and failures on the grid, angles over time by mismatch, and the unperturbed plant."""
@@ -168,8 +161,11 @@ class ControllerSweep:
     lines: Mapping[str, np.ndarray]  # mismatch -> (len(LINES), time), rad or m, at `line_target`; of a batch: none
     nominal: Merit  # of the unperturbed plant, arrays (set points,)
     integration_error: Mapping[str, Any]  # what the integration leaves in the positions, as `IntegrationError.record`
-    least: LeastTimes  # with the largest command of all controllers of the sweep: the same for all on the same plant
+    least: LeastTimes  # with the largest command of all controllers of the sweep that say theirs: the same for all these on the same plant
     own_least: LeastTimes  # with that of the controller
+    says_limit: bool = (
+        True  # whether the controller says its largest command; else both are with the drive's, if that is larger
+    )
 
     def nominal_distance(self, least: LeastTimes) -> Distance | None:
         """From these least times, on the unperturbed plant. None where the command has no limit, and so no time is the least."""
@@ -259,8 +255,16 @@ def sweep_controllers(
     posterior, in the place of mismatches. Raises ValueError as `SweepSettings.check`.
     """
     found, system = settings.check(system, plants), carrying(system, plants)
-    shared = max(_limit(system, name, settings) for name in settings.controllers)
-    return (_sweep(system, name, settings, found, folder, progress, shared) for name in settings.controllers)
+    limits = {name: _limit(system, name, settings) for name in settings.controllers}
+    # One that says none may be given the drive's, hundreds of volts: it has no part in the least times of the others.
+    said = max((one.largest for one in limits.values() if one.said), default=0.0)
+    shared = {name: one._replace(largest=said if one.said else max(said, one.largest)) for name, one in limits.items()}
+    return (_sweep(system, name, settings, found, folder, progress, shared[name]) for name in settings.controllers)
+
+
+class _Limit(NamedTuple):
+    largest: float  # command, in the drive's unit
+    said: bool  # whether the controller says its own; else it is the drive's
 
 
 def _sweep(
@@ -270,9 +274,9 @@ def _sweep(
     plants: PlantSet,
     folder: Path | None,
     progress: Progress,
-    shared: float,
+    shared: _Limit,
 ) -> ControllerSweep:
-    """shared: the largest command of all controllers of the sweep."""
+    """shared: the largest command of all controllers of the sweep, and of this one where it says none."""
     preset = CONTROLLERS[name]
     tuned = tuple(gains for gains in settings.tuned if gains.controller == name)
     # What an older version cached has no least times.
@@ -280,7 +284,7 @@ def _sweep(
         _plant_and_controller(system, name, settings),
         [
             code_of_parts(name, settings.estimator),
-            f"{WITH_LEAST_TIMES} {shared:g}",
+            f"{WITH_LEAST_TIMES} {shared.largest:g}",
             str(dataclasses.replace(settings, controllers=(name,), tuned=tuned)),
             *plants.marks,
         ],
@@ -288,7 +292,7 @@ def _sweep(
     file = None if folder is None else folder / "finished" / f"{name}-{key}.npz"
     saved: dict[str, Any] | None = None if file is None else arrays(file)
     if saved is None:
-        saved = _computed(system, name, settings, plants, progress, shared)
+        saved = _computed(system, name, settings, plants, progress, shared.largest)
         if file is not None:
             file.parent.mkdir(parents=True, exist_ok=True)
             with writing(file) as stream:
@@ -302,6 +306,7 @@ def _sweep(
         Merit(**{field: saved[f"nominal_{field}"] for field in FIELDS}),
         json.loads(str(saved["integration_error"])),
         *(LeastTimes(float(saved[f"{of}limit"]), saved[f"{of}grid"], saved[f"{of}nominal"]) for of in SAVED_LEAST),
+        says_limit=shared.said,
     )
 
 
@@ -316,15 +321,15 @@ def _plant_and_controller(system: System, name: str, settings: SweepSettings) ->
     return plant, tuned[-1].put(plant) if tuned else CONTROLLERS[name].make(plant)
 
 
-def _limit(system: System, name: str, settings: SweepSettings) -> float:
+def _limit(system: System, name: str, settings: SweepSettings) -> _Limit:
     """Largest command of a controller; of one whose main gain is that limit at the ratio nearest to 1, of which distances are told."""
     plant, controller = _plant_and_controller(system, name, settings)
     gain = CONTROLLERS[name].main_gain
-    if gain in LIMITS:
+    if parameters(controller)[gain].limits_command:
         ratio = min(settings.gain_ratios, key=lambda one: abs(one - 1.0))
         (limit,) = get_parameters(controller, [gain])
         controller = set_parameters(controller, {gain: max(1.0, ratio) * float(limit)})
-    return command_limit(plant, controller)
+    return _Limit(command_limit(plant, controller), math.isfinite(float(controller.largest_command())))
 
 
 def _computed(
@@ -360,21 +365,10 @@ def _computed(
     inside, nominal = slice(grid.size), grid.size + np.arange(len(grid.targets))
     result: dict[str, Any] = {"failed": outcome.failed_at[inside].reshape(grid.shape)}
     result["integration_error"] = np.asarray(json_line(error.record()))
-    both = _least(setup, grid, [shared, _limit(system, name, settings)])
+    both = least_times_of(setup, grid, [shared, _limit(system, name, settings).largest])
     for of, least in zip(SAVED_LEAST, both, strict=True):
         result |= {f"{of}{name}": np.asarray(value) for name, value in least._asdict().items()}
     for field in FIELDS:
         values = np.asarray(getattr(outcome.merits, field))
         result[f"grid_{field}"], result[f"nominal_{field}"] = values[inside].reshape(grid.shape), values[nominal]
     return result | {f"line_{mismatch}": line for mismatch, line in zip(lined, angles, strict=True)}
-
-
-def _least(setup: LoopSetup, grid: Grid, limits: Sequence[float]) -> list[LeastTimes]:
-    """Of each limit; a limit given twice is run once."""
-    rows = grid.rows().reshape(*grid.shape, -1)[..., 0, :].reshape(math.prod(grid.shape[:-1]), -1)
-    some = np.concatenate([rows, loop_rows({}, grid.targets, plants=grid.plants)])
-    found: dict[float, LeastTimes] = {}
-    for limit in dict.fromkeys(limits):
-        seconds = least_times(setup, some, limit) if math.isfinite(limit) else np.full(len(some), math.nan)
-        found[limit] = LeastTimes(limit, seconds[: len(rows)].reshape(grid.shape[:-1]), seconds[len(rows) :])
-    return [found[limit] for limit in limits]

@@ -69,6 +69,7 @@ class TuningResult:
     moves: Moves | None
     air: float  # degC, as the controller believes it
     plants: PlantSet  # what the columns of the scenarios mean
+    largest: float  # command that the tuned controller may ask for, in the drive's unit; infinite where it does not say
     integration: IntegrationError  # what the integration leaves in the positions with the tuned gains
 
     @property
@@ -229,6 +230,7 @@ def _validated(
         moves=moves,
         air=float(get_parameters(problem.system, [MISMATCHES["ambient"]])[0]),
         plants=problem.plants,
+        largest=float(tuned.put(problem.system).largest_command()),
         integration=error,
     )
 
