@@ -86,7 +86,7 @@ def write_gains(path: Path, gains: Gains, units: Mapping[str, str], more: Mappin
 
     whole = {"format": FORMAT, "controller": gains.controller, "gains": with_units(gains.values)}
     whole |= {"fixed": with_units(gains.fixed)} if gains.fixed else {}
-    whole |= {"loop": gains.loop.record()} if gains.loop != NOT_KNOWN else {}
+    whole |= {"loop": gains.loop.record()} if gains.loop.record() else {}
     return replace(path, json_text({**whole, "from": dict(more)}))
 
 

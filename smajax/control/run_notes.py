@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
-from smajax.control.loop_settings import NOT_KNOWN, OPTIONS, LoopSettings
+from smajax.control.gains_file import Gains
+from smajax.control.loop_settings import OPTIONS, LoopSettings
+from smajax.control.presets import CONTROLLERS
+from smajax.model.system import System
 
 MOST_SET_POINTS = 50  # with figures of merit; more are a ramp or a sine of a file
 
@@ -47,6 +51,8 @@ class GainsOfFile:
     fixed: Mapping[str, float]  # parameters of the controller that were not tuned, SI
     older: bool  # the file says nothing of the loop
     own: LoopSettings = field(default_factory=LoopSettings)  # of the loop that runs
+    largest: float | None = None  # command of the controller, in the drive's unit; None where it does not say
+    compared: tuple[str, ...] = ()  # all controllers of a sweep, which run in this loop too; none of a single loop
 
 
 @dataclass(frozen=True)
@@ -97,12 +103,23 @@ Note: TypeAlias = InputLeftOut | NotFinite | AboveMelting | TooManySetPoints | s
 
 
 def gains_of_files(
-    files: Mapping[str, tuple[LoopSettings, Mapping[str, float]]], given: LoopSettings, own: LoopSettings
+    tuned: Sequence[Gains], system: System, given: LoopSettings, own: LoopSettings, compared: Sequence[str] = ()
 ) -> Iterator[GainsOfFile]:
     """Of each file of gains what the loop takes from it.
 
-    files: controller -> (its loop, its parameters that were not tuned, SI). given: by options, which go first. own: those of the loop that runs.
+    system: the plant that the controllers assume. given: by options, which go first. own: settings of the loop that runs. compared: all controllers of a sweep.
     """
     over: dict[str, Any] = {name: None for name in OPTIONS if getattr(given, name) is not None}
-    for controller, (loop, fixed) in files.items():
-        yield GainsOfFile(controller, replace(loop, **over), fixed, loop == NOT_KNOWN and not fixed, own)
+    for gains in tuned:
+        largest = float(gains.put(CONTROLLERS[gains.controller].plant(system)).largest_command())
+        # Units alone, which a loop on any plant has, say nothing of what the gains were tuned with.
+        older = not gains.loop.record() and not gains.fixed
+        yield GainsOfFile(
+            gains.controller,
+            replace(gains.loop, **over),
+            gains.fixed,
+            older,
+            own,
+            largest if math.isfinite(largest) else None,
+            tuple(compared),
+        )

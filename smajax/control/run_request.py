@@ -279,7 +279,7 @@ def _assumed(request: RunRequest, loop: LoopRequest) -> _Assumed:
     of_gains = (
         [PresetGains(gains.controller, not is_arm(system))]
         if loop.gains is None
-        else gains_of_files({gains.controller: (gains.loop, gains.fixed)}, loop.given, own)
+        else gains_of_files([gains], system, loop.given, own)
     )
     sources = limit, source, *input_lag_left_out(request.model), *of_gains
     return _Assumed(system, gains, merged, sensor, tuple(one for one in sources if one is not None))

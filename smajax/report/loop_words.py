@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
-from smajax.control.loop_settings import LIMIT_PARAMETER, PERIOD, LoopSettings
+from smajax.control.loop_settings import LIMIT_PARAMETER, OPTIONS, PERIOD, LoopSettings
 from smajax.control.run_notes import (
     GainsOfFile,
     InputLagLeftOut,
@@ -16,6 +16,8 @@ from smajax.control.run_notes import (
 )
 from smajax.core.display_units import digits, display
 from smajax.core.wording import and_listed, counted
+
+SAY_ANOTHER = and_listed([*OPTIONS.values(), "--noise"])  # options of what a loop takes from a file of gains
 
 
 def limit_words(loop: LoopSettings, largest: float | None = None) -> str:
@@ -43,17 +45,27 @@ def loop_rows(loop: LoopSettings, largest: float | None = None) -> list[list[str
     ]
 
 
-def loop_words(loop: LoopSettings) -> str:
-    """`the drive's limit of 6 V, a control period of 10 ms`; "" of nothing known. The sensor is the plant's, and left out."""
+def loop_words(loop: LoopSettings, largest: float | None = None) -> str:
+    """`the drive's limit of 6 V, a control period of 10 ms and no delay`; "" of nothing known. The sensor is the plant's, and left out.
+
+    largest: the controller's own, in the command's unit, which holds where it is the lower one.
+    """
     parts = []
     if loop.command_limit is not None:
-        parts.append(f"the drive's limit of {digits(loop.command_limit, 4)} {loop.command_unit}")
+        of_drive = f"{digits(loop.command_limit, 4)} {loop.command_unit}"
+        of_controller = of_drive if largest is None else f"{digits(largest, 4)} {loop.command_unit}"
+        lower = largest is not None and largest < loop.command_limit and of_controller != of_drive
+        parts.append(
+            f"the controller's limit of {of_controller} (the drive's is {of_drive})"
+            if lower
+            else f"the drive's limit of {of_drive}"
+        )
     if loop.period is not None:
         parts.append(f"a control period of {1e3 * loop.period:g} ms")
-    if loop.delay:
-        parts.append(f"a delay of {counted(loop.delay, 'period')}")
-    if loop.estimator:
-        parts.append(f"the filter `{loop.estimator}`")
+    if loop.delay is not None:
+        parts.append(f"a delay of {counted(loop.delay, 'period')}" if loop.delay else "no delay")
+    if loop.estimator is not None:
+        parts.append(f"the filter `{loop.estimator}`" if loop.estimator else "the true state without a filter")
     return and_listed(parts) if parts else ""
 
 
@@ -114,8 +126,26 @@ def _gains_sentence(source: GainsOfFile) -> str:
     if source.older:
         return (
             f"The gains of {source.controller} are from a file that says neither limit, filter nor control period (an older version, or written "
-            f"by hand): those of this plant and of the options hold, {loop_words(source.own)}."
+            f"by hand): those of this plant and of the options hold, {loop_words(source.own, source.largest)}."
         )
     others = [f"{name} {digits(value, 4)}" for name, value in source.fixed.items()]
-    words = [one for one in (loop_words(source.taken), *others) if one]
+    words = [one for one in (loop_words(source.taken, source.largest), *others) if one]
+    if set(source.compared) - {source.controller}:
+        return _of_all_sentence(source, others)
     return f"As in the file of the gains of {source.controller}: {', '.join(words)}." if words else ""
+
+
+def _of_all_sentence(source: GainsOfFile, others: Sequence[str]) -> str:
+    """Of a sweep of several controllers: what they all take from the file of one of them, and what is of that one alone."""
+    # The largest command is each controller's own; the drive is of all.
+    shared = loop_words(source.taken)
+    sensor = f", {noise_words(source.own)}" if source.taken.estimator == "" else ""
+    lower = "" if source.taken.command_limit is None else " (a controller's own limit holds where it is lower)"
+    said = ""
+    if shared:
+        said = (
+            f"As in the file of the gains of {source.controller}, for all controllers of this sweep ({and_listed(source.compared)}), which are "
+            f"compared in one loop: {shared}{sensor}{lower}; {SAY_ANOTHER} say another."
+        )
+    own = f"For {source.controller} alone, as in its file: {', '.join(others)}." if others else ""
+    return " ".join(one for one in (said, own) if one)

@@ -55,8 +55,8 @@ def write_rows(path: Path, grid: Grid, sweep: ControllerSweep) -> None:
     position = grid.plants.unit
     inputs = np.stack([*ratios, position.of(target), gain], axis=1)
     columns = [*grid.axis_names, f"set_point_{position.shown}", f"{sweep.main_gain}_ratio"]
-    units = {"°": "deg", "°C": "degC", "1/s": "per_s"}
-    merits = [f"{name}_{units.get(unit, unit)}" for name, (_, unit, _) in shown_in(position).items()]
+    units = {"°": "deg", "°C": "degC", "1/s": ""}  # a number per second says so by its name
+    merits = [f"{name}_{units.get(unit, unit)}".rstrip("_") for name, (_, unit, _) in shown_in(position).items()]
     outputs = np.stack([merit_values(sweep.merits, name, position).ravel() for name in SHOWN], axis=1)
     text = io.StringIO(newline="")
     writer = csv.writer(text)

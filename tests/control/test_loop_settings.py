@@ -13,17 +13,18 @@ import pytest
 
 from smajax.cli.commands.sweep import loop_of
 from smajax.cli.plant_options import LoopPlants
-from smajax.control.gains_file import Gains, GainsFileError, read_gains
+from smajax.control.gains_file import Gains, GainsFileError, read_gains, write_gains
 from smajax.control.loop_settings import LoopInUse, LoopSettings, joined
 from smajax.control.model_as_plant import noise_of_file, plant_of, within_limit
 from smajax.control.presets import CONTROLLERS
 from smajax.control.reach import reach_of
-from smajax.control.run_notes import InputLagLeftOut
+from smajax.control.run_notes import InputLagLeftOut, gains_of_files
 from smajax.control.run_request import LoopRequest, RunRequest, run_closed
 from smajax.control.run_result import RunResult
 from smajax.data.model_file.of_presets import model_of_presets
 from smajax.data.model_file.read import load_model
 from smajax.data.model_file.record import ModelOutput, ModelParameter
+from smajax.model.rigs import arm
 from smajax.report.loop_words import limit_words, source_sentence, source_sentences
 from smajax.report.note_words import note_sentences
 from smajax.report.simulate_page import settings_rows
@@ -87,7 +88,41 @@ def test_an_older_file_of_gains_is_read_and_what_it_means_is_said(gains: Path) -
     assert result.loop.command_limit == pytest.approx(7.0)
     assert result.loop.period == 0.01
     assert "says neither limit, filter nor control period" in source_sentences(result.settings)[1]
-    assert "the drive's limit of 7 V and a control period of 10 ms" in source_sentences(result.settings)[1]
+    # The preset of the controller is scaled to a lower limit than the drive's, and the loop is that of no option.
+    ends = "the controller's limit of 4.953 V (the drive's is 7 V), a control period of 10 ms, no delay and the true state without a filter."
+    assert source_sentences(result.settings)[1].endswith(ends)
+
+
+def test_plain_numbers_in_a_file_of_gains_are_said_on_an_arm_too(tmp_path: Path) -> None:
+    """Its position is an angle: the units that were read with the file were taken for settings of its loop."""
+    path = tmp_path / "gains.json"
+    path.write_text('{"controller": "pid", "gains": {"proportional_gain": 10, "integral_gain": 4}}', encoding="utf-8")
+    gains = read_gains(path, arm())
+    own = LoopSettings(555.6, 0.01, 1, "adaptive", 0.0, position_unit="rad")
+    (said,) = source_sentences(gains_of_files([gains], arm(), LoopSettings(), own, ["pid"]))
+    assert said.startswith("The gains of pid are from a file that says neither limit, filter nor control period")
+    assert "the controller's limit of 10 V (the drive's is 555.6 V)" in said
+    result = run_closed(RunRequest(dt=0.01), LoopRequest("", "5deg:0.1s", path, noise=0.0))
+    assert len([one for one in source_sentences(result.settings) if "says neither limit" in one]) == 1
+    rewritten = json.loads(write_gains(path, gains, gains.units(arm()), {}).read_text(encoding="utf-8"))
+    assert "loop" not in rewritten
+
+
+def test_a_sweep_says_all_that_its_controllers_take_from_the_file_of_one_of_them() -> None:
+    of_file = LoopSettings(555.6, 0.01, 0, "", 0.0, position_unit="rad")
+    gains = Gains("pid", {"proportional_gain": 10.0}, {"largest_voltage": 10.0, "rate_filter": 0.02}, of_file)
+    (said,) = source_sentences(gains_of_files([gains], arm(), LoopSettings(), of_file, ["pid", "sld"]))
+    assert said == (
+        "As in the file of the gains of pid, for all controllers of this sweep (pid and sld), which are compared in one loop: the drive's limit of 555.6 V, "
+        "a control period of 10 ms, no delay and the true state without a filter, no noise (a controller's own limit holds where it is lower); "
+        "--set amplifier_limit, --period, --delay, --estimator and --noise say another. "
+        "For pid alone, as in its file: largest_voltage 10, rate_filter 0.02."
+    )
+    (said,) = source_sentences(gains_of_files([gains], arm(), LoopSettings(delay=1), of_file, ["pid"]))
+    assert said == (
+        "As in the file of the gains of pid: the controller's limit of 10 V (the drive's is 555.6 V), a control period of 10 ms and "
+        "the true state without a filter, largest_voltage 10, rate_filter 0.02."
+    )
 
 
 @pytest.mark.parametrize(

@@ -66,6 +66,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_run_of_a_sweep_equals_the_single_loop(folder: Path) -> None:
     with (folder / "vsc3.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
+    assert "switches_per_second" in rows[0], "a number per second says so by its name"
     assert len(rows) == 2 * 2 * 2
     row = rows[-1]
     assert (row["payload_ratio"], row["supply_ratio"], row["set_point_deg"]) == ("2", "2", "30")

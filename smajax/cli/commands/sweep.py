@@ -126,11 +126,13 @@ def loop_of(tuned: Sequence[Gains], given: LoopSettings) -> LoopInUse:
 def _sentences(tuned: Sequence[Gains], given: LoopSettings, plant: System, settings: SweepSettings) -> tuple[str, ...]:
     """What the loops take from the files of gains."""
     from smajax.control.loop_settings import LoopInUse, settings_of
+    from smajax.control.position_unit import unit_named
     from smajax.control.run_notes import gains_of_files
     from smajax.report.loop_words import source_sentences
 
-    own = settings_of(plant, LoopInUse(None, settings.period, settings.delay, settings.estimator), 0.0)
-    return source_sentences(gains_of_files({one.controller: (one.loop, one.fixed) for one in tuned}, given, own))
+    sensor = [float(unit_named(settings.unit).to_own(one)) for one in (settings.noise, settings.quantum)]
+    own = settings_of(plant, LoopInUse(None, settings.period, settings.delay, settings.estimator), *sensor)
+    return source_sentences(gains_of_files(tuned, plant, given, own, settings.controllers))
 
 
 # More than 8 parameters and 80 lines: typer reads the options from them.
