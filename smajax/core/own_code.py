@@ -23,6 +23,7 @@ from typing import Any
 
 import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 PACKAGE = __name__.partition(".")[0]
@@ -137,7 +138,7 @@ class _Reader:
     def _array(self, array: Any) -> None:
         if isinstance(array, jax.core.Tracer):
             raise UnreadableCodeError("an array that JAX traces")
-        if isinstance(array, jax.Array) and jax.dtypes.issubdtype(array.dtype, jax.dtypes.prng_key):
+        if isinstance(array, jax.Array) and jnp.issubdtype(array.dtype, jax.dtypes.prng_key):
             array = jax.random.key_data(array)
         values = np.asarray(array)
         if values.dtype.hasobject:

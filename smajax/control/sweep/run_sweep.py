@@ -297,6 +297,9 @@ def _sweep(
             file.parent.mkdir(parents=True, exist_ok=True)
             with writing(file) as stream:
                 np.savez(stream, **saved)
+    least, own_least = (
+        LeastTimes(float(saved[f"{of}limit"]), saved[f"{of}grid"], saved[f"{of}nominal"]) for of in SAVED_LEAST
+    )
     return ControllerSweep(
         name,
         preset.main_gain,
@@ -305,8 +308,9 @@ def _sweep(
         {mismatch: saved[f"line_{mismatch}"] for mismatch in _lined(plants)},
         Merit(**{field: saved[f"nominal_{field}"] for field in FIELDS}),
         json.loads(str(saved["integration_error"])),
-        *(LeastTimes(float(saved[f"{of}limit"]), saved[f"{of}grid"], saved[f"{of}nominal"]) for of in SAVED_LEAST),
-        says_limit=shared.said,
+        least,
+        own_least,
+        shared.said,
     )
 
 
