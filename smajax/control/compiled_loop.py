@@ -39,7 +39,7 @@ def measured_loop(
     """The same, integrated as `tolerance` asks (`measured_run`), and what that leaves in the states and the command.
 
     The controller is called as often as before. Where it switches, or leaves the loop in a limit cycle, a small difference grows to that of
-    two cycles out of step, which no integration makes smaller.
+    two cycles out of step, which no integration makes smaller: `small` of the error is then false.
     """
     check_tolerance(setup.system, tolerance)
 
@@ -48,5 +48,5 @@ def measured_loop(
         outputs = {name: np.asarray(getattr(loop.run, name))[None] for name in SHOWN}
         return (loop, figures), outputs | {setup.system.drive.command[0]: np.asarray(loop.voltage)[None]}
 
-    _, error, found = integrated(run, setup.system, tolerance, alone(setup.system))
+    _, error, found = integrated(run, setup.system, tolerance, alone(setup.system), switches=True)
     return *found, error

@@ -92,6 +92,16 @@ class AboveMelting:
 
 
 @dataclass(frozen=True)
+class NotResolved:
+    """The integration leaves more in the run than is aimed for."""
+
+    share: float  # of a whole transformation, root mean square
+    limit: float  # the same, aimed for
+    how: str
+    loop: bool  # closed
+
+
+@dataclass(frozen=True)
 class TooManySetPoints:
     """The reference has more set points than figures of merit are given of."""
 
@@ -99,7 +109,7 @@ class TooManySetPoints:
 
 
 # A string is the text of an error that did not end the run.
-Note: TypeAlias = InputLeftOut | NotFinite | AboveMelting | TooManySetPoints | str
+Note: TypeAlias = InputLeftOut | NotFinite | AboveMelting | NotResolved | TooManySetPoints | str
 
 
 def gains_of_files(

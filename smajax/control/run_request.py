@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,6 +18,7 @@ from smajax.control.closed_loop import ClosedLoopSetup, check_answers
 from smajax.control.compiled_loop import measured_loop
 from smajax.control.compose import compose, with_values
 from smajax.control.figures_of_merit import SetPointMerit, merit_by_set_point, set_point_spans
+from smajax.control.found_notes import notes_of_reach, notes_of_run, notes_of_set_points
 from smajax.control.gains_file import Gains, read_gains
 from smajax.control.loop_dataset import labelled_loop
 from smajax.control.loop_settings import LoopInUse, LoopSettings, joined, settings_of
@@ -32,16 +32,12 @@ from smajax.control.model_as_plant import (
 )
 from smajax.control.position_unit import PositionUnit, unit_of
 from smajax.control.presets import CONTROLLERS, check_controller
-from smajax.control.reach import reach_of, reach_sentence
 from smajax.control.reference import resting
 from smajax.control.run_notes import (
     MOST_SET_POINTS,
-    AboveMelting,
     InputLeftOut,
     LimitOfFitRuns,
     NoiseOfModelFile,
-    Note,
-    NotFinite,
     PresetGains,
     Source,
     TooManySetPoints,
@@ -49,11 +45,10 @@ from smajax.control.run_notes import (
 )
 from smajax.control.run_result import RunResult, mismatches
 from smajax.control.scales import is_arm
-from smajax.control.signal_path import between_in_words, check_interface, check_set_points, interface_of, noise_of
+from smajax.control.signal_path import between_in_words, check_interface, interface_of, noise_of
 from smajax.core.names import close_matches
 from smajax.core.parameters import parameter_values
 from smajax.core.wording import and_listed
-from smajax.data.experiment.magnitude import MELTS
 from smajax.data.model_file.record import ModelRecord
 from smajax.data.text_input import clock_of, given, reads_file
 from smajax.model.channels import INPUT_UNITS, REPLACED
@@ -170,13 +165,6 @@ def _unit(name: str) -> str:
     return "N m" if name == "load_torque" else INPUT_UNITS[name]
 
 
-def _notes(data: xr.Dataset) -> list[Note]:
-    wrong = tuple(str(name) for name in data.data_vars if not np.isfinite(data[name].to_numpy()).all())
-    notes: list[Note] = [NotFinite(wrong)] if wrong else []
-    hottest = float(data["temperature"].max())
-    return [*notes, AboveMelting(hottest)] if hottest > MELTS else notes
-
-
 def _check_inputs(request: RunRequest, required: frozenset[str], optional: frozenset[str]) -> None:
     """RequestError for an input that the model does not take, ValueError for one that is missing."""
     for name in request.inputs:
@@ -210,7 +198,7 @@ def run_open(request: RunRequest) -> RunResult:
     left_out = request.inputs_left_out()
     data = simulate_dataset(system, series, request.dt, request.tolerance)
     data = data.assign_coords(time=data["time"].copy(data=clock))  # a sum of steps has rounding errors
-    notes = [*left_out, *_notes(data)]
+    notes = [*left_out, *notes_of_run(data)]
     data = _with_measured(request, system, data)
     return RunResult(data, system, {}, tuple(notes))
 
@@ -236,15 +224,6 @@ def _with_measured(request: RunRequest, system: System, data: xr.Dataset) -> xr.
             shown = {"units": unit, "of": sensors[name], **figures}
             data = data.assign({f"{MEASURED}{name}": ("time", values, shown)})
     return data
-
-
-def _set_point_notes(system: System, position: np.ndarray) -> list[Note]:
-    """A note on a set point beyond the stops of the load."""
-    try:
-        check_set_points(system, unit_of(system).of(np.unique([position.min(), position.max()])).tolist())
-    except ValueError as error:
-        return [f"A set point cannot be reached: {error}"]
-    return []
 
 
 class _Assumed(NamedTuple):
@@ -353,7 +332,7 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
         gains=parameter_values(controller),
         between=between_in_words(*between, own.delay, unit, quantum),
     )
-    notes = _notes(data)
+    notes = notes_of_run(data)
     data = _with_measured(request, plant, data)
     try:
         check_answers(run)
@@ -368,7 +347,7 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
             by_set_point = merit_by_set_point(run, plant)
         else:
             notes.append(TooManySetPoints(count))
-    notes += _set_point_notes(assumed, position) or _reach_notes(setup, position, figures, by_set_point)
+    notes += notes_of_set_points(assumed, position) or notes_of_reach(setup, position, figures, by_set_point)
     return RunResult(
         data=data,
         system=plant,
@@ -380,18 +359,3 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
         loop=settings_of(assumed, own, *sensor),
         controller=controller,
     )
-
-
-def _reach_notes(
-    setup: ClosedLoopSetup, position: np.ndarray, figures: Mapping[str, float], by_set_point: Sequence[SetPointMerit]
-) -> list[Note]:
-    """A note on set points where the loop does not settle, and which no controller could reach."""
-    missed = [one.set_point for one in by_set_point if not np.isfinite(one.merit.settling_time)]
-    if figures and not math.isfinite(figures["settling_time"]):
-        missed = [float(position[0])]
-    if not missed:
-        return []
-    plant = setup.system
-    shown = [float(f"{one:.6g}") for one in unit_of(plant).of(missed)]
-    sentence = reach_sentence(reach_of(plant, setup.controller), plant, [*dict.fromkeys(shown)])
-    return [sentence] if sentence else []

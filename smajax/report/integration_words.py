@@ -19,4 +19,7 @@ def integration_sentence(error: Mapping[str, Any]) -> str:
     share = error["largest_rms_over_stroke"]
     if share is None or not math.isfinite(share):
         return f"Integrated with {how}, as asked for; its error was not measured."
-    return f"Integrated with {how}; the error is {digits(100.0 * share, 2)} % of a whole transformation (root mean square)."
+    against, aim = error.get("against"), error.get("aimed_for")
+    what = f"the error, its difference from {against}," if against else "the error"
+    beyond = f": more than the {digits(100.0 * aim, 3)} % that is aimed for" if aim is not None and share > aim else ""
+    return f"Integrated with {how}; {what} is {digits(100.0 * share, 3 if beyond else 2)} % of a whole transformation (root mean square){beyond}."

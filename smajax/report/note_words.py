@@ -10,6 +10,7 @@ from smajax.control.run_notes import (
     InputLeftOut,
     Note,
     NotFinite,
+    NotResolved,
     TooManySetPoints,
 )
 from smajax.core.display_units import digits
@@ -32,6 +33,15 @@ def _sentence(note: Note) -> str:
             return f"Values that are not finite in {', '.join(variables)}: is the heat or the step too large?"
         case AboveMelting(hottest):
             return f"The wire reaches {hottest:.4g} degC, and it melts at {MELTS:g} degC: is the input's unit right?"
+        case NotResolved(share, limit, how, loop):
+            sensitive = (
+                " A loop whose controller switches or reaches its limits is sensitive by nature: one switch that comes a sample earlier puts two runs out of step, and then "
+                "no integration settles single samples. Take figures of merit from several runs (--seed, other set points), not from this one alone."
+            )
+            return (
+                f"Not resolved: the run ({how}) differs from finer integrations by {digits(100.0 * share, 3)} % of a whole transformation (root mean "
+                f"square), more than the {digits(100.0 * limit, 3)} % that is aimed for. Try a smaller --tolerance, 1e-8, or a smaller --dt."
+            ) + sensitive * loop
         case TooManySetPoints(count):
             return (
                 f"Figures of merit are for constant set points, {MOST_SET_POINTS} at most: this reference has {count}."

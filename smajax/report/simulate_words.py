@@ -11,6 +11,7 @@ import xarray as xr
 
 from smajax.control.figures_of_merit import STEADY_SHARE, SetPointMerit, merit_units
 from smajax.control.mismatch import in_words
+from smajax.control.run_notes import NotResolved
 from smajax.control.run_request import MEASURED
 from smajax.control.run_result import RunResult
 from smajax.core.display_units import axis_label, digits, display, label
@@ -210,7 +211,14 @@ SEVERAL = 6  # set points that a headline names one by one
 
 
 def answer(result: RunResult) -> str:
-    """The run in one sentence: settling time, overshoot and steady error of a closed loop, the way and the temperature of an open run."""
+    """The run in one sentence, and in another one that its integration does not resolve it, where that is so."""
+    share = next((one.share for one in result.notes if isinstance(one, NotResolved)), None)
+    beyond = f" Not resolved: its integration leaves {digits(100.0 * (share or 0.0), 3)} % of a whole transformation."
+    return _answer(result) + beyond * (share is not None)
+
+
+def _answer(result: RunResult) -> str:
+    """Settling time, overshoot and steady error of a closed loop, the way and the temperature of an open run."""
     data = result.data
     if not np.isfinite(data["temperature"]).all():
         return "The run has values that are not finite."

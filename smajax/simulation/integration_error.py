@@ -13,8 +13,8 @@ as a tolerance asks for (`Integration`). Which is cheaper was measured on two co
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeVar
 
 import jax
@@ -33,9 +33,9 @@ AUTO: Literal["auto"] = "auto"
 TOLERANCES = (1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6)
 FINEST = 1e-8  # what the others are measured against in a fit
 FINE = 1e-7  # in a simulation, whose values may be any: at 1e-8 wires from the ends of the declared bounds take 1.7 times the steps
+FINE_AGAIN = 1e-8  # and of a closed loop, which may agree with the first one by chance
 SUBSTEPS = (1, 2, 4, 8, 16, 32, 64)
 MOST_SUBSTEPS = 256
-FINER = 0.01  # times a tolerance that was asked for
 ALONE = (1e-4, 1e-5, 1e-6)  # tolerances of a run by itself
 # Of single precision, whose rounding an error estimate cannot be below.
 TOLERANCES_SINGLE, FINEST_SINGLE = (1e-3,), 1e-4
@@ -51,7 +51,7 @@ class IntegrationError:
     """What an integration leaves in the outputs, by output name, at the worst run: SI; of a fit, an offset that is fitted taken off.
 
     share: the largest root mean square, over the output's noise or its way through a whole transformation (`of`).
-    description: how the runs were integrated. limit: what `share` is to stay below.
+    description: how the runs were integrated. limit: what `share` is to stay below. against: what it was measured against.
     """
 
     rms: dict[str, float]
@@ -60,13 +60,17 @@ class IntegrationError:
     description: str
     of: str = "noise"
     limit: float = 0.1
+    against: str = ""
 
     def record(self) -> dict[str, Any]:
         """For JSON."""
+        aim = {"aimed_for": self.limit} if self.of == "stroke" else {}
         return {
             "how": self.description,
+            **({"against": self.against} if self.against else {}),
             "outputs": {name: {"rms": rms, "largest": self.largest[name]} for name, rms in self.rms.items()},
             f"largest_rms_over_{self.of}": self.share,
+            **aim,
         }
 
     @property
@@ -119,11 +123,15 @@ def finest(system: System) -> Integration:
     return Integration(substeps=MOST_SUBSTEPS)
 
 
-def _reference(system: System, tolerance: float | Literal["auto"]) -> Integration:
-    """Of a tolerance that was asked for no finer than it takes, for it is paid whatever comes of it."""
+def _references(system: System, tolerance: float | Literal["auto"], switches: bool) -> tuple[Integration, ...]:
+    """The same whether a tolerance was asked for or found, so that one trajectory has one error; finer where it was finer than any found.
+
+    switches: a small difference may grow, as in a loop whose controller switches. Two such runs then agree by chance, and two references are taken.
+    """
     if not (_double() and isinstance(system.load, AbstractMovingLoad)):
-        return finest(system)
-    return with_tolerance(FINE if tolerance == AUTO else min(FINER * tolerance, TOLERANCES[-1]))
+        return (finest(system),)
+    share = 1.0 if tolerance == AUTO else min(1.0, tolerance / TOLERANCES[-1])
+    return tuple(with_tolerance(share * one) for one in (FINE, FINE_AGAIN)[: 1 + switches])
 
 
 def whole_transformation(system: System) -> dict[str, float]:
@@ -165,6 +173,14 @@ def measured(
     return IntegrationError(rms, largest, share, described(integration), of="stroke", limit=limit)
 
 
+def _worst(errors: Sequence[IntegrationError], against: str) -> IntegrationError:
+    """The larger one of errors of the same outputs, each by itself."""
+    rms, largest = (
+        {name: max(getattr(one, kind)[name] for one in errors) for name in errors[0].rms} for kind in ("rms", "largest")
+    )
+    return replace(errors[0], rms=rms, largest=largest, share=max(one.share for one in errors), against=against)
+
+
 def integrated(
     run: Callable[[Integration], tuple[Result, Outputs]],
     system: System,
@@ -172,20 +188,26 @@ def integrated(
     choices: Iterator[Integration],
     ways: Mapping[str, float] | None = None,
     limit: float = LARGEST,
+    switches: bool = False,
 ) -> tuple[Integration, IntegrationError, Result]:
     """(integration, its error, what it gave) as `tolerance` asks: a number is taken, and None (one step a sample) is not measured.
 
     Under "auto" it is the first of `choices` whose error is small (`limit`, a share of `ways`, by default those of `whole_transformation`), or
     the first of less than twice the least error where none is. Where friction lets a load jump, or a controller switches, no step length
-    settles at which sample it does.
+    settles at which sample it does. switches: the error is the larger one against two finer integrations.
     """
     if tolerance is None:
         return ONE_STEP, not_measured(ONE_STEP), run(ONE_STEP)[0]
-    ways, (_, exact) = ways or whole_transformation(system), run(_reference(system, tolerance))
+    ways, references = ways or whole_transformation(system), _references(system, tolerance, switches)
+    exact = [run(one)[1] for one in references]
+    against = described(references[0]) + "".join(
+        f" and {float(jnp.asarray(one.tolerance)):g}" for one in references[1:]
+    )
     tried: list[tuple[Integration, IntegrationError, Result]] = []
     for choice in choices if tolerance == AUTO else iter([with_tolerance(tolerance)]):
         result, outputs = run(choice)
-        tried.append((choice, measured(outputs, exact, ways, choice, limit), result))
+        error = _worst([measured(outputs, one, ways, choice, limit) for one in exact], against)
+        tried.append((choice, error, result))
         if tried[-1][1].small:
             return tried[-1]
     least = min(one.share for _, one, _ in tried)

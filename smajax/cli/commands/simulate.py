@@ -154,7 +154,7 @@ def _print(result: RunResult, title: str) -> None:
         typer.echo(f"  {row[0]:<28} {row[1]:>11} … {row[2]:<11} last {row[3]:<11} {row[4]}")
     typer.echo(f"  {integration_sentence(integration_error(result.data))}")
     for sentence in measured_sentences(result):
-        if sentence != answer(result):
+        if sentence not in answer(result):
             typer.echo(f"  {sentence}")
     for row in mismatch_rows(result):
         unit, ratio = f" {row[3]}" * (row[3] != "-"), f", {row[4]}" * bool(row[4])

@@ -1,0 +1,58 @@
+"""What may be wrong with a run that has been computed: notes, as records."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import xarray as xr
+
+from smajax.control.closed_loop import ClosedLoopSetup
+from smajax.control.figures_of_merit import SetPointMerit
+from smajax.control.position_unit import unit_of
+from smajax.control.reach import reach_of, reach_sentence
+from smajax.control.run_notes import AboveMelting, Note, NotFinite, NotResolved
+from smajax.control.signal_path import check_set_points
+from smajax.data.experiment.magnitude import MELTS
+from smajax.model.system import System
+
+
+def notes_of_run(data: xr.Dataset) -> list[Note]:
+    """Notes on values that are not finite, on a wire that would melt, and on a run that its integration does not resolve."""
+    wrong = tuple(str(name) for name in data.data_vars if not np.isfinite(data[name].to_numpy()).all())
+    notes: list[Note] = [NotFinite(wrong)] if wrong else []
+    hottest = float(data["temperature"].max())
+    if hottest > MELTS:
+        notes.append(AboveMelting(hottest))
+    error = json.loads(data.attrs.get("integration_error", "{}"))
+    share, limit = error.get("largest_rms_over_stroke"), error.get("aimed_for")
+    # A run of which the error was not measured has none; one with values that are not finite is said to have these.
+    if not wrong and share is not None and limit is not None and share > limit:
+        notes.append(NotResolved(share, limit, error["how"], loop="controller" in data.attrs))
+    return notes
+
+
+def notes_of_set_points(system: System, position: np.ndarray) -> list[Note]:
+    """A note on a set point beyond the stops of the load."""
+    try:
+        check_set_points(system, unit_of(system).of(np.unique([position.min(), position.max()])).tolist())
+    except ValueError as error:
+        return [f"A set point cannot be reached: {error}"]
+    return []
+
+
+def notes_of_reach(
+    setup: ClosedLoopSetup, position: np.ndarray, figures: Mapping[str, float], by_set_point: Sequence[SetPointMerit]
+) -> list[Note]:
+    """A note on set points where the loop does not settle, and which no controller could reach."""
+    missed = [one.set_point for one in by_set_point if not np.isfinite(one.merit.settling_time)]
+    if figures and not math.isfinite(figures["settling_time"]):
+        missed = [float(position[0])]
+    if not missed:
+        return []
+    plant = setup.system
+    shown = [float(f"{one:.6g}") for one in unit_of(plant).of(missed)]
+    sentence = reach_sentence(reach_of(plant, setup.controller), plant, [*dict.fromkeys(shown)])
+    return [sentence] if sentence else []
