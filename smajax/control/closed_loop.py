@@ -45,6 +45,7 @@ class ClosedLoop(eqx.Module):
     voltage: Series  # the controller's command, as it reaches the amplifier: V, or A or W of such a drive
     measured: MeasuredState  # what the controller measured
     failed_at: Scalar  # s, when the command was first not finite, from where on the drive gets 0 V; else inf
+    reading: Series  # rad or m: what the `sensor` says, noise and steps with it, once a control period and held; without one `run.reading`
 
 
 def as_reference(wanted: Reference | Series) -> Reference:
@@ -172,7 +173,7 @@ class AbstractLoopObserver(AbstractObserver):
 
 
 class _ControlTrace(AbstractObserver):
-    """(command, measured state) of every period, leaves of shape (periods,)."""
+    """(command, measured state, reading) of every period, leaves of shape (periods,)."""
 
     per_period: ClassVar[bool] = True
 
@@ -218,10 +219,12 @@ def simulate_closed_loop(  # the public form: what goes inwards is a `ClosedLoop
 def stored_loop(setup: ClosedLoopSetup) -> ClosedLoop:
     """`simulate_closed_loop` of its arguments."""
     run = _march(setup, (StateTrace(), _ControlTrace()))
-    states, (voltage, measured) = run.results
+    states, (voltage, measured, reading) = run.results
     spread = lambda series: jnp.append(jnp.repeat(series, setup.every), series[-1])  # noqa: E731
     measured = jax.tree.map(spread, measured)
-    return ClosedLoop(trajectory(states), setup.wanted, spread(voltage), measured, run.control.failed_at)
+    series = trajectory(states)
+    read = series.reading if setup.sensor is None else spread(reading)
+    return ClosedLoop(series, setup.wanted, spread(voltage), measured, run.control.failed_at, read)
 
 
 def observe_closed_loop(observer: AbstractObserver, setup: ClosedLoopSetup) -> tuple[Any, Scalar]:
@@ -273,7 +276,7 @@ def _control(setup: ClosedLoopSetup, start: State) -> Control:
         queue = jnp.append(memory.queue, jnp.where(jnp.isfinite(failed_at), 0.0, answer))
         held, queue = queue[0], queue[1:]
         command = Command(held, setup.dt, setup.system.drive.from_command(held))
-        return ControlMemory(estimate, own, held, queue, failed_at), command, (held, measured)
+        return ControlMemory(estimate, own, held, queue, failed_at), command, (held, measured, reading)
 
     reading = reading_of(start, noise[0])
     estimate, measured = (None, with_reading(start, reading)) if estimator is None else estimator.start(reading)

@@ -29,6 +29,7 @@ from smajax.simulation.integration_error import AUTO, IntegrationError, Toleranc
 from smajax.simulation.simulate import DEFAULT_STEP
 
 PERIOD = 0.01  # s, of the controller
+SAMPLED = "sampled"  # attribute of a `reading` that is no state of the plant: the sensor's, held for a control period
 
 
 class Loop(eqx.Module):
@@ -46,11 +47,18 @@ def labelled_loop(
 ) -> xr.Dataset:
     """A closed loop as `labelled_run`, with the command `voltage` (V; of such a drive `current` or `power`) and the position `wanted`.
 
+    Where a sensor reads the position, `reading` is what it says: with its noise and steps, once a control period and held; `position` is the true one.
     A mapping among the settings, such as `gains`, becomes JSON.
     """
     attributes = {name: json.dumps(dict(one)) if isinstance(one, Mapping) else one for name, one in settings.items()}
     result = labelled_run(system, loop.run, {system.drive.command[0]: loop.voltage}, error, **attributes)
     position = result["position"].attrs["units"]
+    if not np.array_equal(loop.reading, loop.run.reading, equal_nan=True):
+        of_sensor = {
+            "long_name": "reading of the position sensor",
+            SAMPLED: "once a control period, with the noise and steps of the sensor",
+        }
+        result["reading"] = ("time", np.asarray(loop.reading), {**result["reading"].attrs, **of_sensor})
     result["wanted"] = ("time", np.asarray(loop.wanted.position), {"units": position, "long_name": "set point"})
     return result
 
@@ -70,7 +78,7 @@ def simulate_loop_dataset(
 
     set_point: a number (rad or m), text with a unit (`"40 deg"`), levels each with its time (`"40deg:5s,10deg:5s"`, which
     need no `seconds`; millimetres of a length), or a `Reference` of samples `dt` apart, which has its own length. The controller is called every
-    `period` seconds. disturbance: further inputs by channel, a value a sample; seed: of the sensor's noise. `tolerance`, and what the integration leaves in the result, as `simulate_dataset`'s.
+    `period` seconds. disturbance: further inputs by channel, a value a sample; seed: of the sensor's noise, which is in `reading` and not in `position`. `tolerance`, and what the integration leaves in the result, as `simulate_dataset`'s.
 
     Raises TypeError for what is no `Loop` (a system without a controller), UnitError for a unit of another kind, ValueError
     for a coupon, a parameter or gain out of its bounds, a period that is no multiple of `dt`, a run without a length or

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from smajax.control.figures_of_merit import STEADY_SHARE, SetPointMerit, merit_units
+from smajax.control.loop_dataset import SAMPLED
 from smajax.control.mismatch import in_words
 from smajax.control.run_notes import NotResolved
 from smajax.control.run_request import MEASURED
@@ -62,6 +63,11 @@ def reads_force(data: xr.Dataset) -> bool:
 def path_of(data: xr.Dataset) -> str:
     """The variable that a run is about."""
     return "strain" if not moves(data) else "force" if reads_force(data) else "position"
+
+
+def reading_of(data: xr.Dataset) -> np.ndarray:
+    """(n,): what the load's own sensor shows; where that has the noise of a loop's sensor, the true position."""
+    return np.asarray(data["position" if SAMPLED in data["reading"].attrs else "reading"].to_numpy())
 
 
 def _redundant(data: xr.Dataset) -> set[str]:
@@ -150,7 +156,7 @@ def run_sentences(result: RunResult) -> list[str]:
         unit = display(data[name].attrs["units"], name)
         return f"{digits(unit.of(float(value)), 3)} {unit.unit}".strip()
 
-    degrees, reading = data["temperature"].to_numpy(), data["reading"].to_numpy()
+    degrees, reading = data["temperature"].to_numpy(), reading_of(data)
     hottest = int(degrees.argmax())
     sentences = [
         f"The wire is at most {at('temperature', degrees[hottest])}, {at('time', data['time'].to_numpy()[hottest])} in."
@@ -244,7 +250,7 @@ def _answer(result: RunResult) -> str:
 def _errors(result: RunResult, figures: Sequence[Mapping[str, float]]) -> str:
     """`an overshoot of 0.1 mm and a steady error of 0.02 mm`; of several the largest."""
     of = display(result.system.load.reading[1])
-    least = ROUNDING * max(float(np.ptp(result.data["reading"].to_numpy())), 1e-12)
+    least = ROUNDING * max(float(np.ptp(reading_of(result.data))), 1e-12)
     shown = []
     for name in ("overshoot", "steady_error"):
         value = max(one[name] for one in figures)
@@ -258,7 +264,7 @@ def _at_ends(result: RunResult) -> list[str]:
     load, time = result.system.load, result.data["time"].to_numpy()
     if not isinstance(load, AbstractMovingLoad):
         return []
-    reading, stress = result.data["reading"].to_numpy(), result.data["stress"].to_numpy()
+    reading, stress = reading_of(result.data), result.data["stress"].to_numpy()
     room = AT_STOP * max(float(np.ptp(reading)), 1e-12)
     sentences = []
     for word, stop, sign in zip(("lower", "upper"), load.limits(), (-1.0, 1.0), strict=True):

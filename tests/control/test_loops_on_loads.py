@@ -6,6 +6,7 @@ import dataclasses
 import itertools
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -18,14 +19,17 @@ from smajax.control.figures_of_merit import band_of
 from smajax.control.gains_file import GainsFileError
 from smajax.control.loop_around import loop_around
 from smajax.control.loop_dataset import simulate_loop_dataset
+from smajax.control.measured_state import Sensor
 from smajax.control.position_unit import default_set_points, unit_of
 from smajax.control.presets import CONTROLLERS, controllers_for, with_printed_law
 from smajax.control.run_request import LoopRequest, RunRequest, run_closed
 from smajax.model.load.coupon import Coupon
+from smajax.model.rigs import arm
 from smajax.model.system import System
 from smajax.model.wire.heat import mass_per_metre
 from smajax.report.loop_words import noise_words
 from smajax.report.note_words import note_sentences
+from smajax.report.simulate_words import run_sentences
 from tests.helpers.often import often
 from tests.helpers.own_load import Lever, Scheduled
 
@@ -309,3 +313,32 @@ def test_the_offset_of_the_strain_is_none_on_the_law_that_is_read_backwards() ->
     expected = -0.55e6 * (float(run.temperature[-1]) - 22.0) / 28e9
     assert float(run.martensite_fraction[-1]) == 1.0
     assert float(strain_offset(SPRING, last)) == pytest.approx(expected, rel=1e-6)
+
+
+def test_the_reading_of_a_loop_is_what_its_sensor_says_with_noise_and_steps() -> None:
+    """It was the true position to the last digit, whatever the noise."""
+    request = RunRequest(seconds=5.0)
+    data = run_closed(request, LoopRequest("pid", "40deg", noise=0.5, quantum=0.2)).data
+    every = round(0.01 / request.dt)
+    said, true = (np.degrees(data[name].to_numpy()) for name in ("reading", "position"))
+    np.testing.assert_allclose(said, 0.2 * np.round(said / 0.2), atol=1e-9)
+    at_calls = (said - true)[:-1:every]
+    assert np.std(at_calls) == pytest.approx(np.hypot(0.5, 0.2 / np.sqrt(12.0)), rel=0.1)
+    held = said[:-1].reshape(-1, every)
+    np.testing.assert_array_equal(held, held[:, :1] + np.zeros(every))
+    # The controller was given nothing else.
+    loop = sma.loop_around(arm(), "pid")
+    stored = sma.simulate_closed_loop(
+        arm(), loop.controller, jnp.full(201, 0.5), 0.005, 2, sensor=Sensor(jnp.asarray(0.01)), key=jax.random.key(0)
+    )
+    np.testing.assert_array_equal(stored.reading, stored.measured.position)
+    assert float(jnp.abs(stored.reading - stored.run.reading).max()) > 0.01
+    # Without noise it is the state's, at every sample.
+    plain = run_closed(request, LoopRequest("pid", "40deg")).data
+    np.testing.assert_array_equal(plain["reading"], plain["position"])
+
+
+def test_a_noisy_reading_is_no_way_of_the_load() -> None:
+    result = run_closed(RunRequest(seconds=2.0), LoopRequest("pid", "40deg", noise=5.0))
+    moved = next(one for one in run_sentences(result) if one.startswith("The angle"))
+    assert "starts at -45 deg, lies between -45 deg" in moved

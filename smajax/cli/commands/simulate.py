@@ -265,6 +265,8 @@ def simulate(
     """Simulate a model once: a wire, a load and a drive with given inputs, or under a controller.
 
     By default the model is the rotary arm of the source. Angles are given in deg; files are in SI with degC and rad.
+    In a closed loop with --noise or --quantum the column `reading` is what the controller's sensor says, once a control
+    period and held; `position` is the true one.
 
     What can differ between the plant and the controller's model: inertia (inertia_ratio), damping, convection
     (convection_coefficient), ambient (ambient_temperature, in degC), payload (payload_mass), supply (amplifier_gain).
