@@ -17,7 +17,8 @@ from smajax.control.compiled_loop import measured_loop
 from smajax.control.controllers.base import AbstractController
 from smajax.control.estimators.base import AbstractEstimator
 from smajax.control.measured_state import Sensor
-from smajax.control.reference import Reference, resting
+from smajax.control.reference import Reference
+from smajax.control.reference_file import reference_of
 from smajax.control.signal_path import check_interface
 from smajax.core.parameters import check_bounds, parameter_values
 from smajax.data.text_input import clock_of, given
@@ -77,7 +78,8 @@ def simulate_loop_dataset(
     """Run a loop from rest: an `xarray.Dataset` over time (s), with the command `voltage` (V) and the position `wanted`.
 
     set_point: a number (rad or m), text with a unit (`"40 deg"`), levels each with its time (`"40deg:5s,10deg:5s"`, which
-    need no `seconds`; millimetres of a length), or a `Reference` of samples `dt` apart, which has its own length. The controller is called every
+    need no `seconds`; millimetres of a length), a column of a file (`"log.csv:COLUMN:deg"`, on straight lines between its rows; `"log.csv:COLUMN:deg:held"`,
+    each row until the next), or a `Reference` of samples `dt` apart, which has its own length. The controller is called every
     `period` seconds. disturbance: further inputs by channel, a value a sample; seed: of the sensor's noise, which is in `reading` and not in `position`. `tolerance`, and what the integration leaves in the result, as `simulate_dataset`'s.
 
     Raises TypeError for what is no `Loop` (a system without a controller), UnitError for a unit of another kind, ValueError
@@ -129,5 +131,4 @@ def _wanted(set_point: float | str | Reference, unit: str, seconds: float | None
         raise ValueError(
             "nothing says how long the run is: give `seconds`, or levels with times ('40deg:5s,10deg:5s')."
         )
-    # A set point holds from its instant on: a mean over the step before it would come early.
-    return resting(jnp.asarray(desired.at(clock_of([desired], seconds, dt))))
+    return reference_of(desired, clock_of([desired], seconds, dt), dt)

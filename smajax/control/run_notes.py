@@ -102,6 +102,13 @@ class NotResolved:
 
 
 @dataclass(frozen=True)
+class StraightLines:
+    """The reference is a column of a file, with straight lines between its rows."""
+
+    column: str  # FILE:COLUMN or FILE:COLUMN:UNIT
+
+
+@dataclass(frozen=True)
 class TooManySetPoints:
     """The reference has more set points than figures of merit are given of."""
 
@@ -109,7 +116,7 @@ class TooManySetPoints:
 
 
 # A string is the text of an error that did not end the run.
-Note: TypeAlias = InputLeftOut | NotFinite | AboveMelting | NotResolved | TooManySetPoints | str
+Note: TypeAlias = InputLeftOut | NotFinite | AboveMelting | NotResolved | StraightLines | TooManySetPoints | str
 
 
 def gains_of_files(

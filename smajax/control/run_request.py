@@ -32,7 +32,8 @@ from smajax.control.model_as_plant import (
 )
 from smajax.control.position_unit import PositionUnit, unit_of
 from smajax.control.presets import CONTROLLERS, check_controller
-from smajax.control.reference import resting
+from smajax.control.reference import Reference
+from smajax.control.reference_file import reference_of
 from smajax.control.run_notes import (
     MOST_SET_POINTS,
     InputLeftOut,
@@ -40,6 +41,7 @@ from smajax.control.run_notes import (
     NoiseOfModelFile,
     PresetGains,
     Source,
+    StraightLines,
     TooManySetPoints,
     gains_of_files,
 )
@@ -137,7 +139,7 @@ class LoopRequest:
     """
 
     controller: str
-    set_points: str  # levels: `40deg:5s,10deg:5s`, or of a length `3mm:10s`
+    set_points: str  # levels: `40deg:5s,10deg:5s`, of a length `3mm:10s`, or of a file `FILE:COLUMN:UNIT`, `FILE:COLUMN:UNIT:held`
     gains: Path | None = None
     # Values of the plant that the controller does not assume, or changes of what it assumes: `+20%`.
     mismatch: Mapping[str, str] = field(default_factory=dict)
@@ -276,8 +278,8 @@ def _noise(request: RunRequest, loop: LoopRequest, system: System) -> tuple[floa
 
 def _set_points(
     request: RunRequest, loop: LoopRequest, own: LoopInUse, every: int, unit: PositionUnit
-) -> tuple[np.ndarray, np.ndarray]:
-    """(time, position) of a whole number of control periods, (n,), s and rad or m."""
+) -> tuple[np.ndarray, Reference, bool]:
+    """(time, reference) of a whole number of control periods, (n,), s and rad or m; whether it goes on straight lines between rows of a file."""
     with _part("set_points"):
         levels = given(loop.set_points, unit.own, request.time, bare=unit.shown)
     clock = clock_of([levels], request.seconds, request.dt)
@@ -285,8 +287,7 @@ def _set_points(
     if periods < 1:
         raise ValueError(f"the run is shorter than one control period of {own.period:g} s.")
     clock = clock[: periods * every + 1]
-    # A set point holds from its instant on: a mean over the step before it would come early.
-    return clock, levels.at(clock)
+    return clock, reference_of(levels, clock, request.dt), levels.measured
 
 
 COMPARED = ("temperature", "stress", "strain")  # beside the load's own reading
@@ -307,12 +308,13 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
     between = own.estimator, sigma, own.period
     check_interface(*between, request.dt, quantum)
     interface = interface_of(assumed, *between, request.dt, own.delay, quantum)
-    clock, position = _set_points(request, loop, own, interface.every, unit)
+    clock, wanted, straight = _set_points(request, loop, own, interface.every, unit)
+    position = np.asarray(wanted.position)
     controller = gains.put(assumed)
     setup = ClosedLoopSetup(
         plant,
         controller,
-        resting(jnp.asarray(position)),
+        wanted,
         request.dt,
         interface.every,
         estimator=interface.estimator,
@@ -345,7 +347,9 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
     if np.ptp(position) > 0.0:
         figures = {}  # they are those of one set point from the start of the run
         count = len(set_point_spans(position))
-        if count <= MOST_SET_POINTS:
+        if straight:
+            notes.append(StraightLines(loop.set_points))
+        elif count <= MOST_SET_POINTS:
             by_set_point = merit_by_set_point(run, plant)
         else:
             notes.append(TooManySetPoints(count))

@@ -1,9 +1,9 @@
-"""Inputs as people write them: `6V:5s,0V:10s`, a constant `25 degC`, or a column of a file `log.csv:U:mV`."""
+"""Inputs as people write them: `6V:5s,0V:10s`, a constant `25 degC`, or a column of a file `log.csv:U:mV`, `log.csv:U:mV:held`."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from smajax.data.readers.resample import resample_input, resample_output, unifor
 from smajax.data.readers.table import Array, MeasuredDataError, Table, check_time
 
 MOST_SAMPLES = 20_000_000
+HELD = ":held"  # behind a column of a file: each row holds until the next one
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,11 @@ class Given:
     time: Array
     values: Array
     seconds: float | None  # how long it lasts
-    measured: bool = False  # samples of a file, with straight lines between them where a model takes values at instants
+    measured: bool = False  # samples of a file, with straight lines between them where values at instants are taken
+
+    def between(self, clock: Array) -> Array:
+        """On straight lines between the samples, from the last one on as it is, shape (n,)."""
+        return np.asarray(np.interp(clock, self.time, self.values))
 
     def at(self, clock: Array) -> Array:
         """The sample that holds at each instant, shape (n,)."""
@@ -125,13 +130,18 @@ def column(path: Path, key: str | int, unit: str, own: str, time: str = "") -> G
 def given(text: str, own: str, time: str = "", bare: str = "") -> Given:
     """An input from text: levels, a constant, or `FILE:COLUMN` and `FILE:COLUMN:UNIT`; `own` is the unit that it comes in.
 
-    bare: see `levels`; a file's column without a unit is asked for one.
+    bare: see `levels`; a file's column without a unit is asked for one. `FILE:COLUMN:UNIT:held`: each row holds until the next one.
     """
     head, colon, rest = text.partition(":")
     if reads_file(text):
-        name, _, unit = rest.partition(":")
+        name, _, unit = rest.removesuffix(HELD).partition(":")
         key: str | int = int(name) if name.isdigit() else name
-        return column(Path(head), key, unit, own, time)
+        found = column(Path(head), key, unit, own, time)
+        return replace(found, measured=not rest.endswith(HELD))
+    if not colon and reads_file(f"{text}:"):
+        raise UnitError(
+            f"got the file {text!r} without a column, expected FILE:COLUMN:UNIT, such as {Path(text).name}:COLUMN:{bare or own}"
+        )
     if colon or "," in text:
         return levels(text, own, bare)
     return Given(np.zeros(1), np.asarray([parse_quantity(text, own, bare=bare)]), None)

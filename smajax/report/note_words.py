@@ -11,10 +11,12 @@ from smajax.control.run_notes import (
     Note,
     NotFinite,
     NotResolved,
+    StraightLines,
     TooManySetPoints,
 )
 from smajax.core.display_units import digits
 from smajax.data.experiment.magnitude import MELTS
+from smajax.data.text_input import HELD
 
 
 def note_sentences(notes: Iterable[Note]) -> list[str]:
@@ -42,6 +44,11 @@ def _sentence(note: Note) -> str:
                 f"Not resolved: the run ({how}) differs from finer integrations by {digits(100.0 * share, 3)} % of a whole transformation (root mean "
                 f"square), more than the {digits(100.0 * limit, 3)} % that is aimed for. Try a smaller --tolerance, 1e-8, or a smaller --dt."
             ) + sensitive * loop
+        case StraightLines(column):
+            return (
+                f"Between the rows of the file the set point goes on straight lines, and figures of merit are for set points that are held: {column}{HELD} "
+                "holds each row until the next one."
+            )
         case TooManySetPoints(count):
             return (
                 f"Figures of merit are for constant set points, {MOST_SET_POINTS} at most: this reference has {count}."

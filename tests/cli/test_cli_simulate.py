@@ -17,10 +17,14 @@ from typer.testing import CliRunner
 from smajax.cli.main import app
 from smajax.cli.result_folder import FolderTaken
 from smajax.control.compose import compose
+from smajax.control.loop_around import loop_around
+from smajax.control.loop_dataset import simulate_loop_dataset
 from smajax.control.mismatch import MISMATCHES
 from smajax.control.perturbed_plant import perturbed_plant
-from smajax.control.run_notes import TooManySetPoints
+from smajax.control.reference_file import read_reference
+from smajax.control.run_notes import StraightLines, TooManySetPoints
 from smajax.control.run_request import LoopRequest, RunRequest, run_closed, run_open
+from smajax.control.run_result import RunResult
 from smajax.core.parameters import parameter_values, set_parameters
 from smajax.core.units import UnitError
 from smajax.data.text_input import clock_of, given, levels
@@ -179,10 +183,51 @@ def test_a_mismatch_is_the_same_plant_in_a_sweep_and_a_run() -> None:
 def test_a_set_point_that_moves_all_the_time_has_no_figures_of_merit(tmp_path: Path) -> None:
     rows = "\n".join(f"{k / 50},{0.2 * np.sin(k / 10)}" for k in range(101))
     (tmp_path / "sine.csv").write_text(f"time (s),angle (rad)\n{rows}\n")
-    found = run_closed(RunRequest(dt=0.01), LoopRequest("pid", f"{tmp_path / 'sine.csv'}:angle (rad)"))
+    found = run_closed(RunRequest(dt=0.01), LoopRequest("pid", f"{tmp_path / 'sine.csv'}:angle (rad):held"))
     assert (found.merit, found.by_set_point) == ({}, ())
     assert TooManySetPoints(100) in found.notes
     assert any("50 at most: this reference has 100." in note for note in note_sentences(found.notes))
+
+
+def test_a_reference_from_a_file_is_the_same_on_a_terminal_and_in_python(tmp_path: Path) -> None:
+    """A sine was a staircase on a terminal, and straight lines in Python."""
+    path = tmp_path / "sine.csv"
+    rows = "\n".join(f"{k / 50},{20.0 + 30.0 * np.sin(0.3 * np.pi * k / 50.0)}" for k in range(501))
+    path.write_text(f"time_s,angle_deg\n{rows}\n")
+
+    def followed(text: str, held: bool) -> RunResult:
+        found = run_closed(RunRequest(dt=0.005), LoopRequest("sld", text))
+        reference = read_reference(path, "time_s", "angle_deg", "deg", 0.005, held=held)
+        np.testing.assert_allclose(found.data["wanted"], reference.position, rtol=0.0, atol=1e-12)
+        plant = build("niti_table_3_1", "arm", "amplified_voltage")
+        loop = loop_around(plant, "sld")
+        again = simulate_loop_dataset(loop, reference, dt=0.005)
+        np.testing.assert_allclose(found.data["position"], again["position"], rtol=0.0, atol=1e-4)
+        np.testing.assert_array_equal(simulate_loop_dataset(loop, text, dt=0.005)["position"], again["position"])
+        return found
+
+    lines, stairs = (followed(f"{path}:angle_deg:deg{how}", bool(how)) for how in ("", ":held"))
+    off = [float(np.sqrt(np.mean((one.data["position"] - one.data["wanted"])[1000:] ** 2))) for one in (lines, stairs)]
+    assert off[0] < off[1], "the derivatives of the reference are lost"
+    (note,) = note_sentences(lines.notes)
+    assert f"{path}:angle_deg:deg:held" in note
+    assert not any(isinstance(one, StraightLines) for one in stairs.notes)
+
+
+def test_rows_of_a_file_that_are_held_have_figures_of_merit(tmp_path: Path) -> None:
+    (tmp_path / "points.csv").write_text("time_s,angle_deg\n0,40\n3,10\n5,10\n")
+    found, asked = (
+        run_closed(RunRequest(), LoopRequest("pid", text))
+        for text in (f"{tmp_path / 'points.csv'}:angle_deg:held", "40deg:3s,10deg:2s")
+    )
+    assert [one.begin for one in found.by_set_point] == [0.0, 3.0]
+    np.testing.assert_array_equal(found.data["position"], asked.data["position"])
+
+
+def test_a_file_without_its_column_is_told_the_form(tmp_path: Path) -> None:
+    (tmp_path / "sine.csv").write_text("time_s,angle_deg\n0,40\n3,10\n")
+    with pytest.raises(UnitError, match=r"FILE:COLUMN:UNIT, such as sine\.csv:COLUMN:deg"):
+        given(str(tmp_path / "sine.csv"), "rad", bare="deg")
 
 
 def test_a_written_run_can_be_an_input(folder: Path, tmp_path: Path) -> None:

@@ -234,7 +234,8 @@ def simulate(
     set_point: Annotated[
         str | None,
         typer.Option(
-            help="set points of the loop, each with its duration: 40deg:5s,10deg:5s, without units in deg (mm of a length) and s, or a file"
+            help="set points of the loop, each with its duration: 40deg:5s,10deg:5s, without units in deg (mm of a length) and s; or a column of a file, "
+            "FILE:COLUMN:UNIT, on straight lines between its rows, FILE:COLUMN:UNIT:held for each row until the next"
         ),
     ] = None,
     mismatch: Annotated[
