@@ -41,6 +41,7 @@ from smajax.report.simulate_words import (
     figures_of,
     integration_error,
     merit_rows,
+    merit_rule,
     mismatch_rows,
     path_of,
     run_sentences,
@@ -85,6 +86,7 @@ def record(result: RunResult, command: str, series: bool = True) -> dict[str, An
         "conclusions": conclusions(result),
         "settings": list(source_sentences(result.settings)),
         "loop": None if result.loop is None else result.loop.record(),
+        "merit_rule": merit_rule(result),
         "merit": _merit(result.merit, units),
         "merit_by_set_point": [
             {
@@ -281,12 +283,13 @@ def _band(result: RunResult) -> float:
 
 def _merit_part(result: RunResult) -> list[str]:
     """The figures of merit of a closed loop."""
+    rule = f"{html.escape(merit_rule(result))}</p>"
     if result.merit:
-        return [table(["figure of merit", "value", "unit"], merit_rows(result), (1,))]
+        return [table(["figure of merit", "value", "unit"], merit_rows(result), (1,)), f"<p class=quiet>{rule}"]
     if not result.by_set_point:
         return []
     head, rows = set_point_rows(result)
-    note = "<p class=quiet>Each from its start to the next one; times count from its start.</p>"
+    note = f"<p class=quiet>Each from its start to the next one; times count from its start. {rule}"
     return [table(head, rows, range(len(head))), note]
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from smajax.control.figures_of_merit import STEADY_SHARE, SetPointMerit, merit_units
+from smajax.control.figures_of_merit import STEADY_SHARE, SetPointMerit, band_of, merit_units
 from smajax.control.loop_dataset import SAMPLED
 from smajax.control.mismatch import in_words
 from smajax.control.run_notes import NotResolved
@@ -99,15 +99,34 @@ def merit_rows(result: RunResult) -> list[list[str]]:
     return [
         [
             label(name) + steady * name.startswith("steady"),
-            _cell(name, value, units),
+            _cell(name, value, units, float(result.data["time"][-1] - result.data["time"][0])),
             "" if np.isinf(value) else display(units[name], name).unit,
         ]
         for name, value in result.merit.items()
     ]
 
 
-def _cell(name: str, value: float, units: Mapping[str, str]) -> str:
-    return "never" if np.isinf(value) else digits(display(units[name], name).of(value), 3)
+def _cell(name: str, value: float, units: Mapping[str, str], seconds: float) -> str:
+    """seconds: how long the set point holds, within which an infinite time is not reached."""
+    return _late(seconds) if np.isinf(value) else digits(display(units[name], name).of(value), 3)
+
+
+def _late(seconds: float) -> str:
+    """Of a time that does not come while a set point holds: it may come later."""
+    return f"not within {digits(seconds, 3)} s"
+
+
+def merit_rule(result: RunResult) -> str:
+    """By which rule the times and errors of a closed loop are found; "" where it has none."""
+    if not (result.merit or result.by_set_point):
+        return ""
+    of = display(result.system.load.reading[1])
+    # A band of 1 degree in rad has rounding errors.
+    near, share = f"±{digits(of.of(float(band_of(result.system))), 3)} {of.unit}", f"{STEADY_SHARE:.0%}"
+    return (
+        f"Reach time: first within {near} of the set point, or beyond it. Settling time: within {near} from then on, and over at least the last {share} of "
+        f"the set point's time; a loop that is there later has not settled. Steady error: mean over the last {share}."
+    )
 
 
 def set_point_rows(result: RunResult) -> tuple[list[str], list[list[str]]]:
@@ -125,7 +144,7 @@ def set_point_rows(result: RunResult) -> tuple[list[str], list[list[str]]]:
             digits(of.of(one.set_point)),
             digits(one.begin),
             digits(one.end),
-            *(_cell(name, value, units) for name, value in figures_of(one).items()),
+            *(_cell(name, value, units, one.end - one.begin) for name, value in figures_of(one).items()),
         ]
         for one in result.by_set_point
     ]
@@ -194,7 +213,9 @@ def conclusions(result: RunResult) -> list[str]:
     if result.merit:
         settles = result.merit["settling_time"]
         sentences.append(
-            f"The loop settles after {digits(settles, 3)} s." if np.isfinite(settles) else "The loop never settles."
+            f"The loop settles after {digits(settles, 3)} s."
+            if np.isfinite(settles)
+            else f"The loop does not settle within {digits(float(result.data['time'][-1]), 3)} s."
         )
     if result.by_set_point:
         each, count = _each_set_point(result)
@@ -203,11 +224,12 @@ def conclusions(result: RunResult) -> list[str]:
 
 
 def _each_set_point(result: RunResult) -> tuple[list[str], int]:
-    """("40 deg after 2.1 s" or "40 deg never" of each set point; at how many the loop settles)."""
+    """("40 deg after 2.1 s" or "40 deg not within 5 s" of each set point; at how many the loop settles)."""
     of = display(result.system.load.reading[1])
     after = [float(one.merit.settling_time) for one in result.by_set_point]
     each = [
-        f"{digits(of.of(one.set_point))} {of.unit} " + (f"after {digits(late, 3)} s" if np.isfinite(late) else "never")
+        f"{digits(of.of(one.set_point))} {of.unit} "
+        + (f"after {digits(late, 3)} s" if np.isfinite(late) else _late(one.end - one.begin))
         for one, late in zip(result.by_set_point, after, strict=True)
     ]
     return each, int(np.isfinite(after).sum())

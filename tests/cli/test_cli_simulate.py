@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 from smajax.cli.main import app
 from smajax.cli.result_folder import FolderTaken
 from smajax.control.compose import compose
+from smajax.control.figures_of_merit import band_of
 from smajax.control.loop_around import loop_around
 from smajax.control.loop_dataset import simulate_loop_dataset
 from smajax.control.mismatch import MISMATCHES
@@ -31,7 +32,7 @@ from smajax.data.text_input import clock_of, given, levels
 from smajax.model.presets import build
 from smajax.report.note_words import note_sentences
 from smajax.report.simulate_page import as_csv, write_run
-from smajax.report.simulate_words import conclusions, summary_rows
+from smajax.report.simulate_words import conclusions, merit_rows, merit_rule, set_point_rows, summary_rows
 from smajax.simulation.compiled import simulate_compiled
 
 pytestmark = pytest.mark.usefixtures("blank_pictures")
@@ -84,7 +85,9 @@ def test_the_page_describes_the_run_in_words() -> None:
     assert "It transforms: the martensite fraction lies between 0.42 and 1.00, at the end 0.42." in told
     assert "The angle starts at -45 deg, lies between -45 deg and 30 deg, and ends at 30 deg." in told
     assert "The loop settles after 2.17 s." in told
-    assert "The loop never settles." in conclusions(run_closed(RunRequest(dt=0.01), LoopRequest("pid", "30deg:2s")))
+    slow = run_closed(RunRequest(dt=0.01), LoopRequest("pid", "30deg:2s"))
+    assert "The loop does not settle within 2 s." in conclusions(slow)
+    assert ["settling time", "not within 2 s", ""] in merit_rows(slow)
 
 
 def test_each_set_point_has_its_own_figures_of_merit(tmp_path: Path) -> None:
@@ -114,7 +117,8 @@ def test_each_set_point_has_its_own_figures_of_merit(tmp_path: Path) -> None:
     assert last["merit"]["settling_time"]["value"] is None
     assert any("settles at 1 of 3 set points: 40 deg after" in one for one in record["conclusions"])
     page = (tmp_path / "three" / "simulate.html").read_text(encoding="utf-8")
-    assert page.count("<td class=n>never</td>") == 2
+    assert page.count("<td class=n>not within 4 s</td>") == 1
+    assert page.count("<td class=n>not within 2 s</td>") == 1
 
 
 def test_a_set_point_beyond_the_stops_is_reported_and_several_are_a_table(tmp_path: Path) -> None:
@@ -222,6 +226,22 @@ def test_rows_of_a_file_that_are_held_have_figures_of_merit(tmp_path: Path) -> N
     )
     assert [one.begin for one in found.by_set_point] == [0.0, 3.0]
     np.testing.assert_array_equal(found.data["position"], asked.data["position"])
+
+
+def test_the_rule_of_the_figures_of_merit_is_said(tmp_path: Path) -> None:
+    """An angle that came into the band for good in the last fifth of its set point was said never to settle, by a rule that stood nowhere."""
+    late = run_closed(RunRequest(), LoopRequest("pid", "40deg:2.2s,10deg:3s"))
+    inside = np.abs(late.data["position"] - late.data["wanted"])[:440] <= np.radians(1.0)
+    assert not np.isfinite(late.by_set_point[0].merit.settling_time)
+    assert bool(inside[-1]), "the case is not the one of this test"
+    assert set_point_rows(late)[1][0][4] == "not within 2.2 s"
+    rule = merit_rule(late)
+    assert "within ±1 deg" in rule
+    assert "last 20% of the set point's time" in rule
+    page = write_run(late, tmp_path, "a run", "smajax").read_text(encoding="utf-8")
+    assert "last 20% of the set point&#x27;s time" in page
+    hanging = run_closed(RunRequest(*HANGING), LoopRequest("pid", "5mm:2s"))
+    assert f"within ±{1e3 * float(band_of(hanging.system)):.3g} mm" in merit_rule(hanging)
 
 
 def test_a_file_without_its_column_is_told_the_form(tmp_path: Path) -> None:

@@ -103,7 +103,7 @@ def test_a_closed_loop_says_whether_it_settles_and_an_open_run_where_it_goes() -
         for point, late, error in ((0.005, 2.5, 1e-5), (0.01, np.inf, 1e-3))
     )
     assert simulate_words.answer(RunResult(data, system, {}, (), several)) == (
-        "pid settles at 1 of 2 set points: 5 mm after 2.5 s, 10 mm never; an overshoot of at most 0.1 mm and a steady error of at most 1 mm."
+        "pid settles at 1 of 2 set points: 5 mm after 2.5 s, 10 mm not within 1 s; an overshoot of at most 0.1 mm and a steady error of at most 1 mm."
     )
 
 

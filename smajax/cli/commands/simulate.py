@@ -141,6 +141,7 @@ def _print(result: RunResult, title: str) -> None:
         answer,
         integration_error,
         merit_rows,
+        merit_rule,
         mismatch_rows,
         set_point_rows,
         summary_rows,
@@ -166,6 +167,8 @@ def _print(result: RunResult, title: str) -> None:
         # The first columns; the page has all.
         for line in aligned([row[:SHOWN] for row in (head, *rows)], right=True):
             typer.echo(f"  {line}")
+    if rule := merit_rule(result):
+        typer.echo(f"  {rule}")
 
 
 # More than 8 parameters and 80 lines: typer reads the options from them.
