@@ -1,5 +1,5 @@
 // A click on a heading sorts its table by the record's numbers (data-v), by numbers in the text, or by the text; another click the
-// other way round. A column is one of numbers where every cell that says something begins with one, or "never", which is later than all.
+// other way round. A column is one of numbers where every cell that says something begins with one, or "never" or "not within", which are later than all.
 document.querySelectorAll("table.sortable").forEach(table => table.querySelectorAll("thead th").forEach((head, column) => {
   head.tabIndex = 0;
   const sort = () => {
@@ -9,7 +9,7 @@ document.querySelectorAll("table.sortable").forEach(table => table.querySelector
     const key = row => {
       const cell = row.cells[column], text = said(row);
       if (cell.dataset.v !== undefined) return Number(cell.dataset.v);
-      if (/^never/.test(text)) return Infinity;
+      if (/^(never|not within)/.test(text)) return Infinity;
       // Of a column that is set as numbers a word may stand before: "beyond 0.2", "< 0.1".
       const found = text.match(cell.classList.contains("n") ? /[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?/i : /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?/i);
       return found ? Number(found[0]) : NaN;
