@@ -38,6 +38,17 @@ class Merit(eqx.Module):
     switches_per_second: Scalar  # 1/s, how often the command turns back by more than `SWITCH_THRESHOLD`
     peak_temperature: Scalar  # C
 
+    def __repr__(self) -> str:
+        """The numbers, of one run or of several; of what is traced, the kinds."""
+        known = jax.Array | np.ndarray | np.generic | float
+        if any(isinstance(one, jax.core.Tracer) or not isinstance(one, known) for one in vars(self).values()):
+            return super().__repr__()
+        shown = ", ".join(
+            f"{name}={np.array2string(np.asarray(one), precision=4, threshold=8, separator=', ')}"
+            for name, one in vars(self).items()
+        )
+        return f"Merit({shown})"
+
 
 # Of an arm.
 MERIT_UNITS = {

@@ -13,10 +13,12 @@ from smajax.control.closed_loop import ClosedLoopSetup
 from smajax.control.figures_of_merit import SetPointMerit
 from smajax.control.position_unit import unit_of
 from smajax.control.reach import reach_of, reach_sentence
-from smajax.control.run_notes import AboveMelting, Note, NotFinite, NotResolved
+from smajax.control.run_notes import AboveMelting, EndsEarly, Note, NotFinite, NotResolved
 from smajax.control.signal_path import check_set_points
 from smajax.data.experiment.magnitude import MELTS
 from smajax.model.system import System
+
+SHORTER = 1e-3  # of a run: less of it, that is left out, is not said
 
 
 def notes_of_run(data: xr.Dataset) -> list[Note]:
@@ -32,6 +34,12 @@ def notes_of_run(data: xr.Dataset) -> list[Note]:
     if not wrong and share is not None and limit is not None and share > limit:
         notes.append(NotResolved(share, limit, error["how"], loop="controller" in data.attrs))
     return notes
+
+
+def notes_of_length(asked: float, clock: np.ndarray, step: float) -> list[Note]:
+    """A note on a run that is shorter than asked by more than a thousandth, for it consists of whole steps (s)."""
+    end = float(clock[-1])
+    return [EndsEarly(asked, end, step)] if asked - end > SHORTER * asked else []
 
 
 def notes_of_set_points(system: System, position: np.ndarray) -> list[Note]:

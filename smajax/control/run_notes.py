@@ -102,6 +102,15 @@ class NotResolved:
 
 
 @dataclass(frozen=True)
+class EndsEarly:
+    """The run ends before the time that was asked for, at its last whole step, or control period of a loop."""
+
+    asked: float  # s
+    end: float  # s
+    step: float  # s
+
+
+@dataclass(frozen=True)
 class StraightLines:
     """The reference is a column of a file, with straight lines between its rows."""
 
@@ -116,7 +125,9 @@ class TooManySetPoints:
 
 
 # A string is the text of an error that did not end the run.
-Note: TypeAlias = InputLeftOut | NotFinite | AboveMelting | NotResolved | StraightLines | TooManySetPoints | str
+Note: TypeAlias = (
+    InputLeftOut | NotFinite | AboveMelting | NotResolved | EndsEarly | StraightLines | TooManySetPoints | str
+)
 
 
 def gains_of_files(

@@ -18,7 +18,7 @@ from smajax.control.closed_loop import ClosedLoopSetup, check_answers
 from smajax.control.compiled_loop import measured_loop
 from smajax.control.compose import compose, with_values
 from smajax.control.figures_of_merit import SetPointMerit, merit_by_set_point, set_point_spans
-from smajax.control.found_notes import notes_of_reach, notes_of_run, notes_of_set_points
+from smajax.control.found_notes import notes_of_length, notes_of_reach, notes_of_run, notes_of_set_points
 from smajax.control.gains_file import Gains, read_gains
 from smajax.control.loop_dataset import labelled_loop
 from smajax.control.loop_settings import LoopInUse, LoopSettings, joined, settings_of
@@ -52,7 +52,7 @@ from smajax.core.names import close_matches
 from smajax.core.parameters import parameter_values
 from smajax.core.wording import and_listed
 from smajax.data.model_file.record import ModelRecord
-from smajax.data.text_input import clock_of, given, reads_file
+from smajax.data.text_input import clock_of, given, length_of, reads_file
 from smajax.model.channels import INPUT_UNITS, REPLACED
 from smajax.model.extended import without_input_lag
 from smajax.model.load.coupon import AbstractCoupon
@@ -200,7 +200,11 @@ def run_open(request: RunRequest) -> RunResult:
     left_out = request.inputs_left_out()
     data = simulate_dataset(system, series, request.dt, request.tolerance)
     data = data.assign_coords(time=data["time"].copy(data=clock))  # a sum of steps has rounding errors
-    notes = [*left_out, *notes_of_run(data)]
+    notes = [
+        *left_out,
+        *notes_of_length(length_of(list(several.values()), request.seconds), clock, request.dt),
+        *notes_of_run(data),
+    ]
     data = _with_measured(request, system, data)
     return RunResult(data, system, {}, tuple(notes))
 
@@ -276,10 +280,16 @@ def _noise(request: RunRequest, loop: LoopRequest, system: System) -> tuple[floa
     return 0.0 if source is None else source.noise, source
 
 
-def _set_points(
-    request: RunRequest, loop: LoopRequest, own: LoopInUse, every: int, unit: PositionUnit
-) -> tuple[np.ndarray, Reference, bool]:
-    """(time, reference) of a whole number of control periods, (n,), s and rad or m; whether it goes on straight lines between rows of a file."""
+class _Wanted(NamedTuple):
+    """The set point over a whole number of control periods, (n,): times (s) and positions (rad or m)."""
+
+    clock: np.ndarray
+    reference: Reference
+    straight: bool  # between rows of a file
+    asked: float  # s: how long the run is to be
+
+
+def _set_points(request: RunRequest, loop: LoopRequest, own: LoopInUse, every: int, unit: PositionUnit) -> _Wanted:
     with _part("set_points"):
         levels = given(loop.set_points, unit.own, request.time, bare=unit.shown)
     clock = clock_of([levels], request.seconds, request.dt)
@@ -287,7 +297,8 @@ def _set_points(
     if periods < 1:
         raise ValueError(f"the run is shorter than one control period of {own.period:g} s.")
     clock = clock[: periods * every + 1]
-    return clock, reference_of(levels, clock, request.dt), levels.measured
+    reference = reference_of(levels, clock, request.dt)
+    return _Wanted(clock, reference, levels.measured, length_of([levels], request.seconds))
 
 
 COMPARED = ("temperature", "stress", "strain")  # beside the load's own reading
@@ -308,7 +319,7 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
     between = own.estimator, sigma, own.period
     check_interface(*between, request.dt, quantum)
     interface = interface_of(assumed, *between, request.dt, own.delay, quantum)
-    clock, wanted, straight = _set_points(request, loop, own, interface.every, unit)
+    clock, wanted, straight, asked = _set_points(request, loop, own, interface.every, unit)
     position = np.asarray(wanted.position)
     controller = gains.put(assumed)
     setup = ClosedLoopSetup(
@@ -334,7 +345,7 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
         gains=parameter_values(controller),
         between=between_in_words(*between, own.delay, unit, quantum),
     )
-    notes = notes_of_run(data)
+    notes = [*notes_of_length(asked, clock, request.dt * interface.every), *notes_of_run(data)]
     # A log is held against the state of the plant: the noise of the loop's sensor is none of the model.
     state = data.assign(reading=("time", np.asarray(run.run.reading), data["reading"].attrs))
     data = _with_measured(request, plant, state).assign(reading=data["reading"])

@@ -147,14 +147,19 @@ def given(text: str, own: str, time: str = "", bare: str = "") -> Given:
     return Given(np.zeros(1), np.asarray([parse_quantity(text, own, bare=bare)]), None)
 
 
-def clock_of(several: Sequence[Given], seconds: float | None, dt: float) -> Array:
-    """t_0 ... t_n of a run as long as asked, or as its longest input. ValueError where nothing says how long."""
+def length_of(several: Sequence[Given], seconds: float | None) -> float:
+    """How long a run is, s: as long as asked, or as its longest input. ValueError where nothing says how long."""
     lasting = [one.seconds for one in several if one.seconds is not None]
     if seconds is None and not lasting:
         raise ValueError(
             "nothing says how long the run is: give levels with times (6V:5s,0V:10s), a file, or --seconds."
         )
-    end = max(lasting) if seconds is None else seconds
+    return max(lasting) if seconds is None else seconds
+
+
+def clock_of(several: Sequence[Given], seconds: float | None, dt: float) -> Array:
+    """t_0 ... t_n of a run as long as `length_of`, in whole steps. ValueError as there, and for no step or too many."""
+    end = length_of(several, seconds)
     if not end / dt <= MOST_SAMPLES:
         raise ValueError(
             f"{end:g} s at {dt:g} s are over {MOST_SAMPLES:,} samples: take a longer --dt or a shorter run."

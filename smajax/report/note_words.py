@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from smajax.control.run_notes import (
     MOST_SET_POINTS,
     AboveMelting,
+    EndsEarly,
     InputLeftOut,
     Note,
     NotFinite,
@@ -44,6 +45,11 @@ def _sentence(note: Note) -> str:
                 f"Not resolved: the run ({how}) differs from finer integrations by {digits(100.0 * share, 3)} % of a whole transformation (root mean "
                 f"square), more than the {digits(100.0 * limit, 3)} % that is aimed for. Try a smaller --tolerance, 1e-8, or a smaller --dt."
             ) + sensitive * loop
+        case EndsEarly(asked, end, step):
+            return (
+                f"The run ends at {digits(end, 4)} s of {digits(asked, 4)} s: it has whole steps of {digits(step, 4)} s (of a loop, control periods). "
+                "A shorter --dt or --period takes it further."
+            )
         case StraightLines(column):
             return (
                 f"Between the rows of the file the set point goes on straight lines, and figures of merit are for set points that are held: {column}{HELD} "

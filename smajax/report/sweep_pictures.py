@@ -249,7 +249,9 @@ def _draw_least(axes: Axes, targets: np.ndarray, sweeps: Sequence[ControllerSwee
         axes.fill_between(targets, 0.0, least, color="black", alpha=0.06, linewidth=0)
     if drawn:
         axes.set_ylim(bottom=0.0)
-        axes.legend(handles=lines, frameon=False, fontsize=8, loc="upper right")
+        # Above the panel: inside it would cover a controller's line.
+        above: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.0}
+        axes.legend(handles=lines, frameon=False, fontsize=8, ncols=2, **above)
 
 
 def draw_comparison(

@@ -244,6 +244,15 @@ def test_the_rule_of_the_figures_of_merit_is_said(tmp_path: Path) -> None:
     assert f"within ±{1e3 * float(band_of(hanging.system)):.3g} mm" in merit_rule(hanging)
 
 
+def test_a_run_that_ends_before_its_last_level_says_so() -> None:
+    short = run_open(RunRequest(inputs={"voltage": "8V:10s"}, dt=3.0))
+    assert float(short.data["time"][-1]) == 9.0
+    assert any("ends at 9 s of 10 s" in one for one in note_sentences(short.notes))
+    assert not any("ends at" in one for one in note_sentences(run_open(RunRequest(inputs={"voltage": "8V:1s"})).notes))
+    loop = run_closed(RunRequest(), LoopRequest("pid", "40deg:1s", period=0.3))
+    assert any("ends at 0.9 s of 1 s" in one for one in note_sentences(loop.notes))
+
+
 def test_a_file_without_its_column_is_told_the_form(tmp_path: Path) -> None:
     (tmp_path / "sine.csv").write_text("time_s,angle_deg\n0,40\n3,10\n")
     with pytest.raises(UnitError, match=r"FILE:COLUMN:UNIT, such as sine\.csv:COLUMN:deg"):

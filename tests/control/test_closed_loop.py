@@ -172,6 +172,10 @@ def test_figures_of_merit_of_a_known_run_are_right() -> None:
     made = eqx.tree_at(lambda one: (one.run.position, one.voltage), loop, (position, voltage))
     one = merit(made, ARM, band=0.02)
     assert float(one.reach_time) == pytest.approx(0.98, abs=1.5 * DT)
+    # It shows its numbers, in a batch too, and stays a pytree.
+    assert "overshoot=0.1" in str(one)
+    assert "f64[" not in str(jax.tree.map(lambda value: jnp.stack([value, value]), one))
+    assert "dtype=float64" in str(jax.eval_shape(lambda value: value, one))
     assert float(one.settling_time) == pytest.approx(2.0 + 0.08 / 0.09, abs=1.5 * DT)
     assert float(one.overshoot) == pytest.approx(0.1, abs=1e-9)
     assert float(one.steady_error) == pytest.approx(0.01, abs=1e-9)

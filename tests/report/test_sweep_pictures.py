@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from smajax.control.position_unit import DEGREES
 from smajax.report.sweep_numbers import MAPPED, SHOWN, map_numbers
-from smajax.report.sweep_pictures import common_limits, draw_maps
+from smajax.report.sweep_pictures import common_limits, draw_comparison, draw_maps
 
 RATIOS = np.geomspace(0.5, 2.0, 5)
 
@@ -45,6 +45,21 @@ def test_the_worst_case_is_of_the_set_points_in_reach_beside_their_median() -> N
     assert numbers["overshoot"]["worst"][1][0] == pytest.approx(8.0 * degree, rel=1e-3)
     assert numbers["overshoot"]["worst"][0][0] == pytest.approx(1.0 * degree, rel=1e-3)
     assert (numbers["settling_time"]["worst"][0][1], numbers["settling_time"]["median"][4][4]) == (None, None)
+
+
+def test_the_legend_of_the_least_time_covers_no_line() -> None:
+    """It stood inside, over the line of a controller that is slow at large set points."""
+    figure = Figure(figsize=(10.0, 14.0), layout="constrained")
+    merits = {name: np.asarray([1.0, 2.0, 3.0]) for name in SHOWN}
+    sweep: Any = SimpleNamespace(
+        name="pid", nominal=SimpleNamespace(**merits), least=SimpleNamespace(nominal=np.asarray([0.8, 0.9, 1.0]))
+    )
+    draw_comparison(figure, np.radians([-20.0, 20.0, 60.0]), [sweep])
+    figure.canvas.draw()
+    keys = [(axes, legend) for axes in figure.axes if (legend := axes.get_legend()) is not None]
+    assert len(keys) == 2
+    for axes, legend in keys:
+        assert legend.get_window_extent().y0 >= axes.get_window_extent().y1 - 1.0
 
 
 def test_axes_say_plant_over_model_and_an_error_of_the_ambient_in_kelvins() -> None:
