@@ -10,6 +10,7 @@ import scipy  # its parts are imported when they are first used
 
 from smajax.data.readers.table import Array
 
+Cells = tuple[np.ndarray, np.ndarray]  # numbers of the cells that were seen, in order, and readings in each
 LEAST = 4.0  # noises: an increment that is smaller leaves no gaps
 FEWEST = 3  # levels over the stroke
 CELL = 0.5  # noises: of the cells into which the scale is cut
@@ -45,8 +46,8 @@ def likeliest_increment(readings: Sequence[Array], sigma: float) -> float:
     return float(1.0 / frequency[best]) if strength[best] > ON_LEVELS and chance < CHANCE else 0.0
 
 
-def _periodogram(frequency: Array, cells: Sequence[tuple[Array, Array]], cell: float) -> tuple[Array, Array]:
-    """(strength, squared sums over levels added up), both (F,), of runs with (cells seen, readings in each)."""
+def _periodogram(frequency: Array, cells: Sequence[Cells], cell: float) -> tuple[Array, Array]:
+    """(strength, squared sums over levels added up), both (F,), of runs with these cells."""
     strength, surprise = np.zeros_like(frequency), np.zeros_like(frequency)
     half = np.array([max(math.floor(one), 1) for one in 0.5 / (frequency * cell)])
     for width in np.unique(half):
@@ -61,7 +62,7 @@ def _periodogram(frequency: Array, cells: Sequence[tuple[Array, Array]], cell: f
     return strength, surprise
 
 
-def _weights(where: Array, counts: Array, half: int) -> Array:
+def _weights(where: np.ndarray, counts: np.ndarray, half: int) -> np.ndarray:
     """Of the cells `where`, in order: readings in each over those at most `half` cells from it."""
     total = np.concatenate([[0], np.cumsum(counts)])
     return counts / (
