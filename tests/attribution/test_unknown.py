@@ -21,7 +21,7 @@ from smajax.attribution.formulas import formulas
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.unknown.ranges import Sought
 from smajax.attribution.unknown.search import Lacking, _explains, in_place_of, unknown_terms
-from smajax.attribution.unknown.spline import COUNT, design, spline
+from smajax.attribution.unknown.spline import COUNT, WAVES, design, spline
 from smajax.attribution.unknown.term_fits import with_terms
 from smajax.attribution.unknown.terms import UNKNOWN
 from smajax.core.parameters import parameters
@@ -52,6 +52,9 @@ LEVELS = (
     (7.0, 8.5, 6.0, 4.5, 10.0, 10.0, 5.0, 1.0, 9.0, 6.5, 3.5, 5.0),
     (11.0, 8.0, 6.5, 5.0, 0.0, 0.0, 8.5, 9.5, 7.5, 4.0, 9.0, 3.0),
 )
+
+
+DRAWS = 20  # of noise on a function's coefficients
 
 
 class _JumpingLoss(AbstractEffect, HeatTerm):
@@ -127,7 +130,7 @@ def test_the_spline_equals_de_boors() -> None:
     knots = step * np.arange(-3, COUNT + 1)
     coefficients = np.random.default_rng(1).normal(size=COUNT)
     share = np.linspace(0.0, 1.0, 101)
-    expected = BSpline(knots, coefficients, 3)(share)
+    expected = BSpline(knots, WAVES @ coefficients, 3)(share)
     np.testing.assert_allclose(design(share) @ coefficients, expected, atol=1e-12)
     found = spline([jnp.asarray(one) for one in coefficients], jnp.asarray([-0.5, *share, 2.0]))
     np.testing.assert_allclose(found, [expected[0], *expected, expected[-1]], atol=1e-12)
@@ -272,15 +275,16 @@ def test_a_formula_of_the_dictionary_is_found_and_a_longer_one_is_not() -> None:
     low, width = 0.0, 80.0
     share = np.linspace(0.0, 1.0, 201)
     x = low + width * share
-    rng = np.random.default_rng(4)
     for truth, text in ((3e-4 * x**2, "^2"), (0.9 / (1.0 + np.exp(-(x - 44.0) / 2.0)), "tanh((T - 44)")):
         coefficients = np.linalg.lstsq(design(share), truth, rcond=None)[0]
-        sigma = 5e-3
-        noisy = coefficients + sigma * rng.normal(size=COUNT)
-        best = formulas(low, width, noisy, sigma**2 * np.eye(COUNT), 200.0, "T")[0]
-        assert text in best.text
-        assert best.numbers <= 2
-        np.testing.assert_allclose(best.curve, truth, atol=0.1 * np.max(truth))
+        sigma, longer = 5e-3, 0
+        for seed in range(DRAWS):
+            noisy = coefficients + sigma * np.random.default_rng(seed).normal(size=COUNT)
+            best = formulas(low, width, noisy, sigma**2 * np.eye(COUNT), 200.0, "T")[0]
+            assert text in best.text
+            longer += best.numbers > 2
+            np.testing.assert_allclose(best.curve, truth, atol=0.1 * np.max(truth))
+        assert longer <= 0.2 * DRAWS  # ln 200 a number lets chance add one of a dozen words in about a twentieth
 
 
 def test_a_formula_describes_the_function_even_where_the_parameters_could_absorb_it() -> None:
@@ -288,7 +292,7 @@ def test_a_formula_describes_the_function_even_where_the_parameters_could_absorb
     share = np.linspace(0.0, 1.0, 201)
     truth = 0.1 * np.cos(4.0 * share)
     coefficients = np.linalg.lstsq(design(share), truth, rcond=None)[0]
-    scaled = 1.0 + coefficients
+    scaled = np.linalg.lstsq(design(share), 1.0 + truth, rcond=None)[0]
     covariance = 1e-4 * np.eye(COUNT) + 10.0 * np.outer(scaled, scaled)
     best = formulas(0.0, 1.0, coefficients, covariance, 500.0, "s")[0]
     # As high a shift as the function is large, but not on to -1.

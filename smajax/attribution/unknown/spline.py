@@ -1,7 +1,9 @@
-"""Smooth functions of one state: cubic B-splines on an even grid, held outside of it.
+"""Smooth functions of one state: cubic B-splines on an even grid, held outside of it, as a sum of cosine waves.
 
 De Boor 1978, chapter X. Evaluated as a cubic with one truncated power at each inner knot: a fraction of the work of the
-basis functions, in a place that is evaluated many times a step.
+basis functions, in a place that is evaluated many times a step. The coefficients of the B-splines are a sum of cosine waves, and
+the sizes of those are what is fitted: a prior of one width for all of them says that a function is more likely smooth (a discrete
+smoothness prior; Wahba 1990, chapter 1), where independent B-splines would each fit the noise of their own few samples.
 """
 
 from __future__ import annotations
@@ -15,8 +17,9 @@ import numpy as np
 
 from smajax.model.types import Scalar
 
-COUNT = 7  # coefficients of one function
+COUNT = 11  # B-splines of one function, and waves
 PIECES = COUNT - 3
+LONG = 2.0  # half waves over the range, up to which a wave is about as large as the constant; beyond it falls as 1/k^2
 
 
 def _powers() -> np.ndarray:
@@ -34,19 +37,26 @@ def _powers() -> np.ndarray:
     return table
 
 
-POWERS = _powers()
+def _waves() -> np.ndarray:
+    """(COUNT, COUNT): what each wave of size one contributes to each B-spline's coefficient (a discrete cosine transform)."""
+    number = np.arange(COUNT)
+    width = 1.0 / np.sqrt(1.0 + (number / LONG) ** 4)
+    return np.cos(np.pi * np.outer(number + 0.5, number) / COUNT) * width
+
+
+WAVES = _waves()
+POWERS = _powers() @ WAVES
 
 
 @jax.jit  # traced once and not at each of the hundred places of a step
 def spline(coefficients: Sequence[Scalar], share: Scalar) -> Scalar:
     """The function at `share` of its range, 0..1; outside of that what it is at the nearer end.
 
-    `coefficients` are about its values at the knots and, the first and the last, a piece beyond the range; those of a
-    constant are all alike.
+    `coefficients` are the sizes of its waves, the constant's first; those of a constant are zero but for that.
     """
     u = PIECES * jnp.where(share < 0.0, 0.0, jnp.where(share > 1.0, 1.0, share))
     powers = [
-        sum(float(weight) * one for weight, one in zip(row, coefficients, strict=True) if weight) for row in POWERS
+        sum(float(weight) * one for weight, one in zip(row, coefficients, strict=True)) for row in POWERS
     ]
     found = powers[0] + u * (powers[1] + u * (powers[2] + u * powers[3]))
     for knot in range(1, PIECES):

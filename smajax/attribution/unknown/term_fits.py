@@ -27,10 +27,11 @@ from smajax.model.effects.candidate import PRIOR_ODDS
 from smajax.model.effects.prior_width import CoefficientPrior
 
 INDISTINGUISHABLE = 3.0  # in log odds: twenty to one
-# Of the likeliest's log odds over no term: seven splines leave about a hundredth of a function, and in which equation they leave
+# Of the likeliest's log odds over no term: eleven waves leave about a hundredth of a function, and in which equation they leave
 # less of it says nothing.
 APPROXIMATE = 0.01
 PASSES = 2  # the error of a sample is first that of the model without a term, then that of the best with one
+LARGEST = 3.0  # size of a wave, in shares of the largest function that is sought
 MUCH = 7e4  # samples times directions of the derivative, of one fit
 REACH = 10.0  # in log odds behind the likeliest, within which a term is fitted again with the smaller error
 
@@ -50,7 +51,7 @@ def with_terms(setting: Search, final: Model | FittedModel) -> tuple[Search, np.
     known |= setting.prior_records(presets=False)
     own_values = dataclasses.replace(plain.per_run, start=plain.per_run_at(jnp.asarray(final.values[index])))
     problem = plain.with_system(whole, per_run=own_values, priors=known)
-    bounds = {**setting.bounds, **dict.fromkeys(own, (-1.0, 1.0))}
+    bounds = {**setting.bounds, **dict.fromkeys(own, (-LARGEST, LARGEST))}
     unknowns = tuple(setting.free(final.effects))
     search = Search(
         problem,

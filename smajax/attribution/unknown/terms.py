@@ -1,6 +1,6 @@
 """Unknown terms: a smooth function of one state put into one equation, for what no effect of the library accounts for.
 
-They are effects like any other, but no candidates: a function of seven coefficients says where something is missing and
+They are effects like any other, but no candidates: a function of eleven coefficients says where something is missing and
 what it looks like, not what it is. With all coefficients zero each leaves the base model as it is.
 """
 
@@ -11,7 +11,7 @@ from typing import ClassVar
 import equinox as eqx
 import jax.numpy as jnp
 
-from smajax.attribution.unknown.spline import spline
+from smajax.attribution.unknown.spline import COUNT, spline
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
 from smajax.model.effects.candidate import Candidate, Equation
@@ -25,8 +25,8 @@ from smajax.model.wire.kinetics_terms import ShapeTerm
 from smajax.model.wire.resistance import ResistanceTerm
 from smajax.model.wire.wire import Wire
 
-FORMULA = "f: seven cubic B-splines, each coefficient a share of the largest f that is sought"
-COEFFICIENTS = ("c1", "c2", "c3", "c4", "c5", "c6", "c7")
+FORMULA = "f: eleven cosine waves as cubic B-splines, each coefficient a share of the largest f that is sought"
+COEFFICIENTS = tuple(f"c{wave}" for wave in range(COUNT))
 
 
 def _candidate(title: str, equation: Equation) -> Candidate:
@@ -42,15 +42,22 @@ def _candidate(title: str, equation: Equation) -> Candidate:
 
 
 class AbstractUnknown(AbstractEffect):
-    r"""$f(x) = s \sum_j c_j B_j\big((x - x_0)/w\big)$ of one state x, cubic B-splines B_j, held outside of x_0..x_0 + w."""
+    r"""$f(x) = s \sum_k c_k W_k\big((x - x_0)/w\big)$ of one state x, held outside of x_0..x_0 + w.
 
-    c1: Scalar = parameter("-", -1.0, 1.0, "about f/s a quarter of the range below it", default=0.0)
-    c2: Scalar = parameter("-", -1.0, 1.0, "about f/s at the lower end", default=0.0)
-    c3: Scalar = parameter("-", -1.0, 1.0, "about f/s at a quarter of the range", default=0.0)
-    c4: Scalar = parameter("-", -1.0, 1.0, "about f/s at the middle", default=0.0)
-    c5: Scalar = parameter("-", -1.0, 1.0, "about f/s at three quarters", default=0.0)
-    c6: Scalar = parameter("-", -1.0, 1.0, "about f/s at the upper end", default=0.0)
-    c7: Scalar = parameter("-", -1.0, 1.0, "about f/s a quarter of the range above it", default=0.0)
+    The wave $W_k = (1 + (k/2)^4)^{-1/2} \sum_j \cos\big(\pi k (j + 1/2)/11\big) B_j$ has k half periods, of eleven cubic B-splines $B_j$.
+    """
+
+    c0: Scalar = parameter("-", -3.0, 3.0, "f/s of the constant", default=0.0)
+    c1: Scalar = parameter("-", -3.0, 3.0, "about f/s of the wave of one half period", default=0.0)
+    c2: Scalar = parameter("-", -3.0, 3.0, "about f/s of the wave of two half periods", default=0.0)
+    c3: Scalar = parameter("-", -3.0, 3.0, "about f/s of the wave of three half periods", default=0.0)
+    c4: Scalar = parameter("-", -3.0, 3.0, "about f/s of the wave of four half periods", default=0.0)
+    c5: Scalar = parameter("-", -3.0, 3.0, "about f/s of the wave of five half periods", default=0.0)
+    c6: Scalar = parameter("-", -3.0, 3.0, "about f/s of the wave of six half periods", default=0.0)
+    c7: Scalar = parameter("-", -3.0, 3.0, "about f/s of the wave of seven half periods", default=0.0)
+    c8: Scalar = parameter("-", -3.0, 3.0, "about f/s of the wave of eight half periods", default=0.0)
+    c9: Scalar = parameter("-", -3.0, 3.0, "about f/s of the wave of nine half periods", default=0.0)
+    c10: Scalar = parameter("-", -3.0, 3.0, "about f/s of the wave of ten half periods", default=0.0)
     low: Scalar = eqx.field(converter=jnp.asarray, default=0.0)  # x_0, in the state's unit
     width: Scalar = eqx.field(converter=jnp.asarray, default=1.0)  # w
     scale: Scalar = eqx.field(converter=jnp.asarray, default=1.0)  # s, in the function's unit
@@ -63,7 +70,7 @@ class AbstractUnknown(AbstractEffect):
 
     def value(self, x: Scalar) -> Scalar:
         """f(x)."""
-        coefficients = (self.c1, self.c2, self.c3, self.c4, self.c5, self.c6, self.c7)
+        coefficients = [getattr(self, name) for name in COEFFICIENTS]
         return self.scale * spline(coefficients, (x - self.low) / self.width)
 
 
