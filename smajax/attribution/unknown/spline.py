@@ -55,9 +55,7 @@ def spline(coefficients: Sequence[Scalar], share: Scalar) -> Scalar:
     `coefficients` are the sizes of its waves, the constant's first; those of a constant are zero but for that.
     """
     u = PIECES * jnp.where(share < 0.0, 0.0, jnp.where(share > 1.0, 1.0, share))
-    powers = [
-        sum(float(weight) * one for weight, one in zip(row, coefficients, strict=True)) for row in POWERS
-    ]
+    powers = [sum(float(weight) * one for weight, one in zip(row, coefficients, strict=True)) for row in POWERS]
     found = powers[0] + u * (powers[1] + u * (powers[2] + u * powers[3]))
     for knot in range(1, PIECES):
         beyond = jnp.where(u > knot, u - knot, 0.0)
