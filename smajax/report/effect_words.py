@@ -25,7 +25,11 @@ def meaning(effect: str, fitted: Fitted) -> str:
                 f"The friction in motion is as large as at rest (their ratio, sliding, is {with_error(value, error)}): this is plain Coulomb "
                 f"friction{grows}, and the speed about which it would fall means nothing."
             )
-    return LIBRARY[effect].candidate.sentence
+    candidate = LIBRARY[effect].candidate
+    switches = [fitted[name][0] for name in candidate.switches if name in fitted]
+    if candidate.negative_sentence and switches and max(switches) < 0.0:
+        return candidate.negative_sentence
+    return candidate.sentence
 
 
 def sign_sentences(effect: str, fitted: Fitted) -> tuple[str, ...]:

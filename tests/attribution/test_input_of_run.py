@@ -139,12 +139,12 @@ def test_what_was_wrong_with_one_run_is_nothing_that_other_runs_or_the_model_fil
 def test_the_page_says_what_the_record_should_have_been() -> None:
     findings = dataclasses.replace(made_findings(), record_errors=(FOUND,))
     (said,) = of_wrong_records(findings)
-    assert "the recorded voltage of steps is 0.8 ± 0.001 s early: what it shows acted so much later" in said
+    assert "the recorded voltage of steps is 0.8000 ± 0.0010 s early: what it shows acted so much later" in said
     assert "Without that the search names draught in its place." in said
     clock = dataclasses.replace(FOUND, coefficient="input_clock.rate", value=-0.01, standard_error=1e-3)
-    assert what_was_wrong(clock).endswith("right at its start, and 0.6 ± 0.06 s late at its end")
+    assert what_was_wrong(clock).endswith("right at its start, and 0.600 ± 0.060 s late at its end")
     load = dataclasses.replace(FOUND, channel="mass", coefficient="wrong_load.share", value=-0.1, standard_error=2e-3)
-    assert what_was_wrong(load) == "the recorded mass of steps should have been 0.9 ± 0.002 of what it is"
+    assert what_was_wrong(load) == "the recorded mass of steps should have been 0.9000 ± 0.0020 times what it is"
 
 
 def _loop_with_a_late_run(*only: str) -> Findings:

@@ -35,6 +35,14 @@ def test_friction_that_does_not_fall_with_the_speed_is_called_the_plain_one(
     assert meaning("stribeck_friction", {}) == FALLS
 
 
+@pytest.mark.parametrize(
+    ("heating", "cooling", "said"), [(-1e-10, -2e-10, "fewer"), (-1e-10, 2e-10, "more"), (1e-9, 0.0, "more")]
+)
+def test_an_effect_below_zero_is_said_the_other_way_round(heating: float, cooling: float, said: str) -> None:
+    fitted = {"heating": (heating, None), "cooling": (cooling, None)}
+    assert f"{said} degrees" in meaning("stress_dependent_width", fitted)
+
+
 def with_effect(name: str, **coefficients: CoefficientFinding) -> Findings:
     found = made_effect(name, LIBRARY[name].candidate.title, "mechanics", 2.04e-5, added=True)
     return dataclasses.replace(made_findings(), effects=(dataclasses.replace(found, coefficients=dict(coefficients)),))

@@ -116,6 +116,7 @@ class Candidate:
     equation: Equation  # where its physics belongs, whatever contract it is written with
     formula: str  # plain text, with its source
     sentence: str  # for an engineer: what its presence means
+    negative_sentence: str = ""  # what it means where all its switches end below zero; "": the same
     # Coefficients that switch the effect on: their base value is zero and the score test looks at them. The others
     # (a width, a scale) mean nothing until a switch is off zero and keep their default until then.
     switches: tuple[str, ...]

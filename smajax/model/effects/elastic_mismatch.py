@@ -41,6 +41,8 @@ class ElasticMismatch(AbstractEffect, HistoryTerm, ConstitutiveTerm):
         "(Elahinia 2004, eq. 4.51, 4.52)",
         sentence="Austenite stretches less than martensite under the same elastic stress (the stress less its thermal part), so a wire that "
         "is heated under a high stress also gives back elastic strain: the more, the higher the stress.",
+        negative_sentence="Austenite stretches more than martensite under the same elastic stress (the stress less its thermal part), so a wire that "
+        "is heated under a high stress recovers less: the less, the higher the stress.",
         switches=("contrast",),
         initial_guess={"contrast": 0.5},
         applies=_applies,

@@ -43,6 +43,7 @@ class PhaseModulus(AbstractEffect, ConstitutiveTerm):
         equation="constitutive",
         formula="E = E_M [1 + a (1 - xi)] in eq. 3.2 (Elahinia 2004, eq. 3.15, E_A = (1 + a) E_M)",
         sentence="Austenite is stiffer than martensite: a hot wire stretches less than a cold one when its load changes.",
+        negative_sentence="Austenite is softer than martensite: a hot wire stretches more than a cold one when its load changes.",
         switches=("contrast",),
         initial_guess={"contrast": 0.5},
         applies=_applies,

@@ -25,6 +25,8 @@ class RisingConvection(AbstractEffect, HeatTerm):
         formula="h = h_c [1 + a (T - T_inf)] in eq. 3.1 (free convection; Elahinia 2004, appendix A)",
         sentence="The hotter the wire, the better the air takes its heat away: one constant h_c cools too little when hot "
         "and too much when nearly cold.",
+        negative_sentence="The hotter the wire, the less well the air takes its heat away: one constant h_c cools too much when hot "
+        "and too little when nearly cold.",
         switches=("slope",),
         initial_guess={"slope": 2e-3},
         prior_class="material",

@@ -29,6 +29,7 @@ class StressDependentWidth(AbstractEffect, RangeTerm):
         formula="A_f' = A_s' + (A_f - A_s)(1 + a sigma), M_f' = M_s' - (M_s - M_f)(1 + b sigma) in eq. 3.3 and 3.5 (usual form: "
         "a stress slope for each of the four temperatures)",
         sentence="Under a heavier load the transformation is spread over more degrees: it starts where it should and ends late.",
+        negative_sentence="Under a heavier load the transformation takes fewer degrees: it starts where it should and ends early.",
         switches=("heating", "cooling"),
         initial_guess={"heating": 1e-9, "cooling": 1e-9},
         observable=several_forces,

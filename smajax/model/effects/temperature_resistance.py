@@ -27,6 +27,8 @@ class TemperatureResistance(AbstractEffect, ResistanceTerm):
         formula="R = R_base [1 + alpha (T - 20 C)] (usual form of a metal, any electrical handbook)",
         sentence="A hot wire conducts worse than a cold one in the same phase: at a given voltage it gets less power, and a "
         "measured resistance goes on rising where nothing transforms.",
+        negative_sentence="A hot wire conducts better than a cold one in the same phase: at a given voltage it gets more power, and a "
+        "measured resistance goes on falling where nothing transforms.",
         switches=("coefficient",),
         initial_guess={"coefficient": 5e-4},
         prior_class="material",

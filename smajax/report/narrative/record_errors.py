@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from smajax.attribution.findings import Findings
 from smajax.attribution.record_error import RecordError
-from smajax.core.display_units import digits
+from smajax.core.display_units import with_error
 from smajax.core.wording import and_listed
 
 
@@ -21,17 +21,15 @@ def of_wrong_records(findings: Findings) -> Iterator[str]:
 
 
 def what_was_wrong(one: RecordError) -> str:
-    """As "the recorded voltage of steps is 0.8 ± 0.001 s early: what it shows acted so much later"."""
+    """As "the recorded voltage of steps is 0.8000 ± 0.0010 s early: what it shows acted so much later"."""
     channel = f"recorded {one.channel} of {one.run}"
     if one.coefficient == "input_delay.delay":
         when, then = ("early", "later") if one.value > 0.0 else ("late", "earlier")
-        return f"the {channel} is {_number(abs(one.value), one.standard_error)} s {when}: what it shows acted so much {then}"
+        return f"the {channel} is {with_error(abs(one.value), one.standard_error)} s {when}: what it shows acted so much {then}"
     if one.coefficient == "input_clock.rate":
         when = "early" if one.value > 0.0 else "late"
         off, error = (abs(value) * one.seconds for value in (one.value, one.standard_error))
-        return f"the {channel} is on another clock: right at its start, and {_number(off, error)} s {when} at its end"
-    return f"the {channel} should have been {_number(1.0 + one.value, one.standard_error)} of what it is"
-
-
-def _number(value: float, error: float) -> str:
-    return f"{digits(value, 3)} ± {digits(error, 1)}"
+        return (
+            f"the {channel} is on another clock: right at its start, and {with_error(off, error)} s {when} at its end"
+        )
+    return f"the {channel} should have been {with_error(1.0 + one.value, one.standard_error)} times what it is"
