@@ -64,9 +64,9 @@ class AttributionConfig:
     )
     terms_refitted: int = 6  # about one an equation
     term_start_share: float = 0.5  # of the score test's estimate: where a refit starts
-    term_start_limit: float = 0.8  # of the largest coefficient: a start stays off the bound
+    term_start_limit: float = 0.8  # coefficients, in widths of their prior: a fit does not start farther off
     term_prior_sigma: float = (
-        1.0  # of every coefficient about zero, in shares of the largest: the fit is then well posed
+        1.0  # of every coefficient about zero, a wave of half the largest function: the fit is then well posed
     )
     term_points: int = 61  # at which the function is tabulated
     term_bins: int = 20  # of its range, in which samples are counted

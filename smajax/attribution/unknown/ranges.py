@@ -18,7 +18,8 @@ from smajax.model.wire.heat import cross_section, mass_per_metre
 SPARED = 1e-3  # share of the samples on either side that may lie outside: a speed has peaks of one sample
 MARGIN = 0.02  # of the range, beyond it
 SAME = 1e-3  # of its own size: a state that moves by less is a constant
-# Sizes of a function that is as large as its coefficients are wide, one width: the curve stays monotonic, |f| + |f'|/4 < 1, at 0.4;
+# Sizes of the largest function that is sought, half as much again as a standard deviation of its prior: the curve stays monotonic, |f| + |f'|/4 < 1, at 0.4
+# (but for one in thirty of the functions of that prior);
 # a softening of the wire stays below its stiffness at 0.15; transformation strain stays positive at 0.15 eps_L.
 BENT, SOFTER, STRETCHED = 0.4, 0.15, 0.15
 SHARE = 0.5  # of what the equation has in it: heat loss, stored heat, resistance, force, reading

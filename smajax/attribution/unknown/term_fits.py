@@ -31,7 +31,7 @@ INDISTINGUISHABLE = 3.0  # in log odds: twenty to one
 # less of it says nothing.
 APPROXIMATE = 0.01
 PASSES = 2  # the error of a sample is first that of the model without a term, then that of the best with one
-LARGEST = 3.0  # size of a wave, in shares of the largest function that is sought
+LARGEST = 2.0  # size of a wave: each is then at most as large as the largest function that is sought
 MUCH = 7e4  # samples times directions of the derivative, of one fit
 REACH = 10.0  # in log odds behind the likeliest, within which a term is fitted again with the smaller error
 

@@ -25,7 +25,7 @@ from smajax.model.wire.kinetics_terms import ShapeTerm
 from smajax.model.wire.resistance import ResistanceTerm
 from smajax.model.wire.wire import Wire
 
-FORMULA = "f: eleven cosine waves as cubic B-splines, each coefficient a share of the largest f that is sought"
+FORMULA = "f: eleven cosine waves as cubic B-splines, each coefficient twice its share of the largest f that is sought, or less"
 COEFFICIENTS = tuple(f"c{wave}" for wave in range(COUNT))
 
 
@@ -44,20 +44,20 @@ def _candidate(title: str, equation: Equation) -> Candidate:
 class AbstractUnknown(AbstractEffect):
     r"""$f(x) = s \sum_k c_k W_k\big((x - x_0)/w\big)$ of one state x, held outside of x_0..x_0 + w.
 
-    The wave $W_k = (1 + (k/2)^4)^{-1/2} \sum_j \cos\big(\pi k (j + 1/2)/11\big) B_j$ has k half periods, of eleven cubic B-splines $B_j$.
+    The wave $W_k = \frac12 (1 + (k/2)^4)^{-1/2} \sum_j \cos\big(\pi k (j + 1/2)/11\big) B_j$ has k half periods, of eleven cubic B-splines $B_j$.
     """
 
-    c0: Scalar = parameter("-", -3.0, 3.0, "f/s of the constant", default=0.0)
-    c1: Scalar = parameter("-", -3.0, 3.0, "about f/s of the wave of one half period", default=0.0)
-    c2: Scalar = parameter("-", -3.0, 3.0, "about f/s of the wave of two half periods", default=0.0)
-    c3: Scalar = parameter("-", -3.0, 3.0, "about f/s of the wave of three half periods", default=0.0)
-    c4: Scalar = parameter("-", -3.0, 3.0, "about f/s of the wave of four half periods", default=0.0)
-    c5: Scalar = parameter("-", -3.0, 3.0, "about f/s of the wave of five half periods", default=0.0)
-    c6: Scalar = parameter("-", -3.0, 3.0, "about f/s of the wave of six half periods", default=0.0)
-    c7: Scalar = parameter("-", -3.0, 3.0, "about f/s of the wave of seven half periods", default=0.0)
-    c8: Scalar = parameter("-", -3.0, 3.0, "about f/s of the wave of eight half periods", default=0.0)
-    c9: Scalar = parameter("-", -3.0, 3.0, "about f/s of the wave of nine half periods", default=0.0)
-    c10: Scalar = parameter("-", -3.0, 3.0, "about f/s of the wave of ten half periods", default=0.0)
+    c0: Scalar = parameter("-", -2.0, 2.0, "twice f/s of the constant", default=0.0)
+    c1: Scalar = parameter("-", -2.0, 2.0, "size of the wave of one half period", default=0.0)
+    c2: Scalar = parameter("-", -2.0, 2.0, "size of the wave of two half periods", default=0.0)
+    c3: Scalar = parameter("-", -2.0, 2.0, "size of the wave of three half periods", default=0.0)
+    c4: Scalar = parameter("-", -2.0, 2.0, "size of the wave of four half periods", default=0.0)
+    c5: Scalar = parameter("-", -2.0, 2.0, "size of the wave of five half periods", default=0.0)
+    c6: Scalar = parameter("-", -2.0, 2.0, "size of the wave of six half periods", default=0.0)
+    c7: Scalar = parameter("-", -2.0, 2.0, "size of the wave of seven half periods", default=0.0)
+    c8: Scalar = parameter("-", -2.0, 2.0, "size of the wave of eight half periods", default=0.0)
+    c9: Scalar = parameter("-", -2.0, 2.0, "size of the wave of nine half periods", default=0.0)
+    c10: Scalar = parameter("-", -2.0, 2.0, "size of the wave of ten half periods", default=0.0)
     low: Scalar = eqx.field(converter=jnp.asarray, default=0.0)  # x_0, in the state's unit
     width: Scalar = eqx.field(converter=jnp.asarray, default=1.0)  # w
     scale: Scalar = eqx.field(converter=jnp.asarray, default=1.0)  # s, in the function's unit
