@@ -89,6 +89,7 @@ class _Reader:
     def __init__(self) -> None:
         self.hash = hashlib.sha256(f"python {platform.python_version()}".encode())
         self.seen: dict[int, tuple[int, Any]] = {}  # with the object itself, so that no other one gets its address
+        self.read_of_modules: set[tuple[str, str]] = set()
 
     def word(self, *parts: object) -> None:
         for one in parts:
@@ -126,12 +127,11 @@ class _Reader:
             self.read(one)
 
     def _module(self, module: types.ModuleType, names: tuple[str, ...]) -> None:
-        if (mark := _installed(module.__name__)) or id(module) in self.seen:
-            self.word("module", module.__name__, mark)
-            return
-        self.word("module", module.__name__)
-        for name in names:
-            if name in vars(module):
+        self.word("module", module.__name__, mark := _installed(module.__name__))
+        for name in () if mark else names:
+            # Two modules may read of each other.
+            if name in vars(module) and (module.__name__, name) not in self.read_of_modules:
+                self.read_of_modules.add((module.__name__, name))
                 self.word(name)
                 self.read(vars(module)[name], names)
 
@@ -150,12 +150,30 @@ class _Reader:
     def _named(self, thing: Any) -> None:
         module = thing.__module__ or ""
         self.word("named", module, getattr(thing, "__qualname__", getattr(thing, "__name__", "")), _installed(module))
+        if (
+            isinstance(thing, types.FunctionType) and "<locals>" in thing.__qualname__
+        ):  # made by a call, whose values it holds
+            self._cells(thing)
 
     def _function(self, function: types.FunctionType) -> None:
         self.word("function")
         self._code(function.__code__)
         self.read(function.__defaults__)
         self.read(function.__kwdefaults__)
+        self._cells(function)
+        if function.__dict__:
+            self.read({name: one for name, one in function.__dict__.items() if name != "__wrapped__"})
+            self.read(getattr(function, "__wrapped__", None))
+        attributes = _names_of(function.__code__)
+        for name in _globals_of(function.__code__):
+            if name in function.__globals__:
+                self.word("global", name)
+                self.read(function.__globals__[name], attributes)
+        for name in _imports_of(function.__code__):
+            self.word("import", name)
+            self.read(sys.modules.get(name), attributes)
+
+    def _cells(self, function: types.FunctionType) -> None:
         for cell in function.__closure__ or ():
             try:
                 self.read(cell.cell_contents)
@@ -163,11 +181,6 @@ class _Reader:
                 if isinstance(error, UnreadableCodeError):
                     raise
                 self.word("empty")
-        attributes = _names_of(function.__code__)
-        for name in _globals_of(function.__code__):
-            if name in function.__globals__:
-                self.word("global", name)
-                self.read(function.__globals__[name], attributes)
 
     def _code(self, code: types.CodeType) -> None:
         self.word("code", code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount, code.co_flags)
@@ -197,8 +210,11 @@ class _Reader:
                 self.read(type(thing))
                 self._all(thing)
             case set() | frozenset():
+                self.read(type(thing))
                 self._all(sorted(thing, key=repr), "set")
             case dict() | types.MappingProxyType():
+                self.read(type(thing))
+                self.read(getattr(thing, "default_factory", None))
                 self._all((part for pair in thing.items() for part in pair), "table")
             case property():
                 self._all((thing.fget, thing.fset, thing.fdel), "property")
@@ -226,8 +242,9 @@ class _Reader:
         """What `functools.wraps` made of a function, or what can be copied."""
         wrapped = getattr(thing, "__wrapped__", None)
         if wrapped is not None:
-            # What begins with an underscore is a cache, or where in its file the function is: no part of what it does.
-            held = {name: one for name, one in getattr(thing, "__dict__", {}).items() if not name.startswith("_")}
+            # What begins with an underscore in a library's is a cache, or where in its file the function is: no part of what it does.
+            every = {name: one for name, one in getattr(thing, "__dict__", {}).items() if not name.startswith("__")}
+            held = {name: one for name, one in every.items() if is_own(type(thing)) or not name.startswith("_")}
             self._all((type(thing), wrapped, held), "wrapped")
             return
         try:
@@ -257,6 +274,12 @@ def _globals_of(code: types.CodeType) -> list[str]:
             if step.opname in ("LOAD_GLOBAL", "LOAD_NAME")
         }
     )
+
+
+def _imports_of(code: types.CodeType) -> list[str]:
+    """Modules that a function and those within it import when they run; those that are loaded by then."""
+    steps = (step for part in _nested(code) for step in dis.get_instructions(part))
+    return sorted({str(step.argval) for step in steps if step.opname == "IMPORT_NAME"} & sys.modules.keys())
 
 
 def _names_of(code: types.CodeType) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ import hashlib
 import json
 import os
 import platform
+import re
 import subprocess
 import uuid
 import warnings
@@ -89,11 +90,14 @@ def code_mark(what: str, *things: Any) -> str:
 
 def digest(model: Any, more: Sequence[str | np.ndarray] = ()) -> str:
     """Hex digest of the code, also of classes and functions in `model` that are not of the package, of the structure and the numbers of `model`, and of `more`."""
-    mark = hashlib.sha256(f"{source_mark()} {plugins.versions() or ''} {jax.tree.structure(model)}".encode())
+    # An address is another one in every process; what is there, `own_parts` finds.
+    structure = re.sub(r" at 0x[0-9a-f]+", "", str(jax.tree.structure(model)))
+    mark = hashlib.sha256(f"{source_mark()} {plugins.versions() or ''} {structure}".encode())
     for part in own_parts(model):
         mark.update(code_mark(f"The code of {getattr(part, '__qualname__', part)}", part).encode())
     for leaf in (*jax.tree.leaves(model), *more):
-        mark.update(leaf.encode() if isinstance(leaf, str) else np.ascontiguousarray(leaf).tobytes())
+        text = getattr(leaf, "__qualname__", "a function") if callable(leaf) else leaf
+        mark.update(text.encode() if isinstance(text, str) else np.ascontiguousarray(text).tobytes())
     return mark.hexdigest()
 
 

@@ -29,10 +29,9 @@ def free_by_name(experiment: Experiment, runs: Sequence[Run]) -> dict[str, Unkno
 
 
 def own_values(experiment: Experiment, runs: Sequence[Run]) -> PerRun:
-    """The unknowns with one value for each of `runs`, at their start; of a run that has none, the experiment's value."""
+    """The unknowns with one value for each of `runs`, at their start; of a run that has none, zero."""
     per_run = [unknown for unknown in experiment.unknowns if unknown.per_run]
-    known = experiment.base_values
-    start = [[one.start if one.of(run.name) else known[one.name] for one in per_run] for run in runs]
+    start = [[one.start if one.of(run.name) else 0.0 for one in per_run] for run in runs]
     single = tuple(unknown.name for unknown in per_run if unknown.runs is not None)
     names = tuple(unknown.name for unknown in per_run)
     whole = jnp.asarray(start, dtype=float).reshape(len(runs), len(names))

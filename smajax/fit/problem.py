@@ -50,7 +50,7 @@ class FitTask(NamedTuple):
 
 
 class PerRun(eqx.Module):
-    """Parameters that have one value for each run; of those in `single` some runs alone, and no others, have one that is fitted."""
+    """Parameters that have one value for each run; those in `single` are fitted in some runs alone, and zero in all others."""
 
     names: tuple[str, ...] = eqx.field(static=True)
     runs: tuple[str, ...] = eqx.field(static=True)

@@ -233,8 +233,10 @@ def _runs(findings: Findings) -> list[dict[str, Any]]:
 
 
 def _own_values(findings: Findings) -> list[str]:
-    """Parameters with a value of each run's own."""
-    return list(dict.fromkeys(parameter_of(one.name) for one in findings.after if is_of_run(one.name)))
+    """Parameters with a value of each run's own; how wrong the record of one run is, no other run has."""
+    single = {one.coefficient for one in findings.record_errors}
+    names = dict.fromkeys(parameter_of(one.name) for one in findings.after if is_of_run(one.name))
+    return [name for name in names if name not in single]
 
 
 def _other_outputs(findings: Findings) -> list[dict[str, Any]]:

@@ -174,11 +174,14 @@ def measured(
 
 
 def _worst(errors: Sequence[IntegrationError], against: str) -> IntegrationError:
-    """The larger one of errors of the same outputs, each by itself."""
+    """The larger one of errors of the same outputs, each by itself; nan where one is."""
     rms, largest = (
-        {name: max(getattr(one, kind)[name] for one in errors) for name in errors[0].rms} for kind in ("rms", "largest")
+        {name: float(np.max([getattr(one, kind)[name] for one in errors])) for name in errors[0].rms}
+        for kind in ("rms", "largest")
     )
-    return replace(errors[0], rms=rms, largest=largest, share=max(one.share for one in errors), against=against)
+    return replace(
+        errors[0], rms=rms, largest=largest, share=float(np.max([one.share for one in errors])), against=against
+    )
 
 
 def integrated(

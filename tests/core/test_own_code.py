@@ -7,10 +7,12 @@ import subprocess
 import sys
 import threading
 import types
+from collections import defaultdict
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -24,6 +26,7 @@ from smajax.model.rigs import arm
 PART = """
 import dataclasses
 import functools
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 from smajax.control.controllers.base import AbstractController
@@ -129,3 +132,61 @@ def test_code_that_cannot_be_read_is_another_digest_every_time() -> None:
         code_digest(held)
     with pytest.warns(UnreadableCodeWarning, match=r"The code of .*held cannot be read \(lock: .*is not used again"):
         assert digest([held]) != digest([held])
+
+
+class _Scaled:
+    """A decorator of a user, with a number that begins with an underscore."""
+
+    def __init__(self, function: Callable[..., Any], gain: float) -> None:
+        self._gain = gain
+        vars(self)["__wrapped__"] = function
+
+
+def _with(**attributes: float) -> Callable[..., Any]:
+    def step(x: float) -> float:
+        return x
+
+    vars(step).update(attributes)
+    return step
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        (jax.nn.initializers.constant(0.1), jax.nn.initializers.constant(0.2)),  # a library's function with a value
+        (_Scaled(loaded, 1.0), _Scaled(loaded, 2.0)),
+        (_with(gain=1.0), _with(gain=2.0)),
+        (defaultdict(int), defaultdict(list)),
+    ],
+)
+def test_what_holds_another_value_is_another_digest(one: Any, other: Any) -> None:
+    assert code_digest([one]) == code_digest([one]) != code_digest([other])
+
+
+def _module(name: str, text: str) -> types.ModuleType:
+    made = types.ModuleType(name)
+    sys.modules[name] = made
+    exec(text, vars(made))
+    return made
+
+
+def test_modules_that_import_each_other_and_imports_within_a_function_are_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    marks = []
+    for gain in (1.0, 2.0, 2.0):
+        for name in ("own_first", "own_second"):
+            monkeypatch.setitem(sys.modules, name, types.ModuleType(name))
+        first = _module("own_first", "def step(x):\n    import own_second\n    return own_second.scaled(x)\n")
+        second = _module("own_second", f"GAIN = {gain}\ndef scaled(x):\n    return GAIN * x * other.PART\n")
+        vars(first)["PART"], vars(second)["other"] = 3.0, first
+        marks.append(code_digest(vars(first)["step"]))
+    assert marks[0] != marks[1] == marks[2]
+
+
+def test_the_digest_of_a_model_with_a_function_is_the_same_wherever_that_is_in_memory() -> None:
+    class Holder(eqx.Module):
+        law: Callable[..., Any] = eqx.field(static=True)
+        leaf: Callable[..., Any]
+
+    several = [Holder(_with(gain=gain), _with()) for gain in (1.0, 1.0, 2.0)]
+    first, same, other = (digest(one) for one in several)
+    assert first == same != other

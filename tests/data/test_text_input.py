@@ -46,6 +46,27 @@ def test_a_few_places_where_a_reading_rests_are_no_levels(seed: int) -> None:
     assert likeliest_increment(logs, 1e-5) == 0.0
 
 
+@pytest.mark.parametrize("samples", [3, 10])
+@pytest.mark.parametrize("levels", [5, 10])
+def test_set_points_at_even_distances_are_no_levels_of_the_sensor(levels: int, samples: int) -> None:
+    """Two runs of one staircase of set points, each reached with a time constant of a few samples."""
+    rng, sigma = np.random.default_rng(6), 1e-5
+    wanted = np.repeat(30.0 * sigma * np.array([*range(levels), *range(levels, 0, -1)]), 150)
+    logs = []
+    for _ in range(2):
+        reached = np.zeros(len(wanted))
+        for k in range(1, len(wanted)):
+            reached[k] = reached[k - 1] + (wanted[k] - reached[k - 1]) / samples
+        logs.append(reached + sigma * rng.normal(size=len(wanted)))
+    assert likeliest_increment(logs, sigma) == 0.0
+
+
+def test_a_long_log_without_noise_that_goes_everywhere_has_no_increment() -> None:
+    rng = np.random.default_rng(7)
+    log = np.cumsum(rng.normal(size=100_000))
+    assert likeliest_increment([log, log[::-1]], 0.0) == 0.0
+
+
 def test_a_smooth_log_has_no_increment() -> None:
     rng = np.random.default_rng(4)
     logs = [stroke + 1e-5 * rng.normal(size=stroke.size) for stroke in _strokes(rng)]

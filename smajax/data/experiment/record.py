@@ -55,7 +55,7 @@ class DeclaredPriors:
 class Unknown:
     """A parameter to be found, in the program's own unit (SI, degC, rad): low < high, low <= start <= high.
 
-    per_run: each run has a value of its own; where `runs` names some, these alone, and all others have the experiment's.
+    per_run: each run has a value of its own; where `runs` names some, these alone, and in all others it is zero.
     `RUN_STARTS` holds the names that are no parameter's.
     """
 

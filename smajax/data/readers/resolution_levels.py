@@ -3,24 +3,33 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import scipy  # its parts are imported when they are first used
 
 from smajax.data.readers.table import Array
 
-Cells = tuple[np.ndarray, np.ndarray]  # numbers of the cells that were seen, in order, and readings in each
 LEAST = 4.0  # noises: an increment that is smaller leaves no gaps
 FEWEST = 3  # levels over the stroke
-CELL = 0.5  # noises: of the cells into which the scale is cut
+CELLS = 8  # into which the smallest increment is cut: half a noise each
 ON_LEVELS = 0.75  # of the periodogram: normal noise about levels 8.3 noises apart, exp(-2 pi^2 / 8.3^2)
 CHANCE = (
     0.01  # of readings that lie anywhere, at most, to look like that at any increment from the largest to the one found
 )
 FINENESS = 8  # frequencies looked at per turn over the whole stroke
 MOST = 20_000  # of them
-BLOCK = 64  # at a time
+COARSER = 1.2  # ratio of the windows within which readings are counted, from one to the next
+# Beyond so many noises, and such a share of the increment (the frequency is one of a few), a reading is between levels; noise leaves few there.
+BETWEEN, NEAR, FEW = 3.5, 0.125, 2e-3
+
+
+class _Cells(NamedTuple):
+    """Of one run: numbers of the cells that were seen, in order, from the lowest of them, and readings in each."""
+
+    where: np.ndarray
+    counts: np.ndarray
 
 
 def likeliest_increment(readings: Sequence[Array], sigma: float) -> float:
@@ -28,43 +37,72 @@ def likeliest_increment(readings: Sequence[Array], sigma: float) -> float:
 
     readings: one array (n,) a run, of noise `sigma`. Every run may have its own zero. The periodogram of the readings over the
     scale: 1 where all lie on levels, about one over the root of their number where they go everywhere. So that a stroke counts and
-    not how long the reading rests where, every reading weighs one over the number of those within half an increment of it:
+    not how long the reading rests at its ends, every reading weighs one over the number of those within half an increment of it:
     the weights of a run add up to the levels that it was on. Of a run with m levels the squared sum of turns over m has by chance
-    the exponential distribution, and several runs' together that of the sum (Scargle 1982).
+    the exponential distribution, and several runs' together that of the sum (Scargle 1982). Rests at even distances, as of a staircase of
+    set points, are told from levels by the way between them: a sensor's readings are on levels there too, but for one at each change.
     """
     stroke = max(float(np.ptp(one)) for one in readings)
     finest = max(LEAST * sigma, stroke * FINENESS / MOST)
     if stroke <= FEWEST * finest:
         return 0.0
-    frequency = np.arange(FEWEST / stroke, 1.0 / finest, 1.0 / (FINENESS * stroke))
-    cell = CELL * sigma
-    cells = [np.unique(np.round(one / cell).astype(np.int64), return_counts=True) for one in readings]
-    strength, surprise = _periodogram(frequency, cells, cell)
+    cell = finest / CELLS
+    frequency, strength, surprise = _periodogram([_cells(one, cell) for one in readings], cell, stroke, finest)
     best = int(np.argmax(strength))
     tried = 1.0 + best / FINENESS
     chance = tried * float(scipy.special.gammaincc(len(readings), surprise[best]))
-    return float(1.0 / frequency[best]) if strength[best] > ON_LEVELS and chance < CHANCE else 0.0
+    increment = float(1.0 / frequency[best])
+    found = strength[best] > ON_LEVELS and chance < CHANCE and _on_levels_throughout(readings, increment, sigma)
+    return increment if found else 0.0
 
 
-def _periodogram(frequency: Array, cells: Sequence[Cells], cell: float) -> tuple[Array, Array]:
-    """(strength, squared sums over levels added up), both (F,), of runs with these cells."""
-    strength, surprise = np.zeros_like(frequency), np.zeros_like(frequency)
-    half = np.array([max(math.floor(one), 1) for one in 0.5 / (frequency * cell)])
-    for width in np.unique(half):
-        weighed = [(cell * where, _weights(where, counts, int(width))) for where, counts in cells]
-        levels = [float(weight.sum()) for _, weight in weighed]
-        # Some at a time: all of them for a long log would not fit in memory.
-        chosen = np.flatnonzero(half == width)
-        for block in np.array_split(chosen, -(-len(chosen) // BLOCK)):
-            sums = [np.abs(np.exp(2j * np.pi * np.outer(frequency[block], at)) @ weight) for at, weight in weighed]
-            strength[block] = np.sum(sums, axis=0) / sum(levels)
-            surprise[block] = sum(one**2 / level for one, level in zip(sums, levels, strict=True))
-    return strength, surprise
+def _cells(readings: Array, cell: float) -> _Cells:
+    where, counts = np.unique(np.round(readings / cell).astype(np.int64), return_counts=True)
+    return _Cells(where - where[0], counts)
 
 
-def _weights(where: np.ndarray, counts: np.ndarray, half: int) -> np.ndarray:
-    """Of the cells `where`, in order: readings in each over those at most `half` cells from it."""
-    total = np.concatenate([[0], np.cumsum(counts)])
-    return counts / (
-        total[np.searchsorted(where, where + half, side="right")] - total[np.searchsorted(where, where - half)]
-    )
+def _periodogram(runs: Sequence[_Cells], cell: float, stroke: float, finest: float) -> tuple[Array, Array, Array]:
+    """(frequencies, strength, squared sums over levels added up), each (F,), from `FEWEST` levels over the stroke to the finest."""
+    length = scipy.fft.next_fast_len(math.ceil(FINENESS * (stroke / cell + 1.0)), real=True)
+    frequency = np.arange(length // 2 + 1) / (length * cell)
+    sought = np.flatnonzero((frequency >= FEWEST / stroke) & (frequency <= 1.0 / finest))
+    strength, surprise = np.zeros(len(sought)), np.zeros(len(sought))
+    half = 0.5 / (frequency[sought] * cell)  # an increment, in cells
+    for width, chosen in _by_width(half):
+        weights = [_weights(one, width) for one in runs]
+        levels = [float(one.sum()) for one in weights]
+        sums = []
+        for one, weight in zip(runs, weights, strict=True):
+            scale = np.zeros(length)
+            scale[one.where] = weight
+            sums.append(np.abs(np.fft.rfft(scale))[sought[chosen]])
+        strength[chosen] = np.sum(sums, axis=0) / sum(levels)
+        surprise[chosen] = sum(one**2 / level for one, level in zip(sums, levels, strict=True))
+    return frequency[sought], strength, surprise
+
+
+def _by_width(half: Array) -> Iterator[tuple[int, np.ndarray]]:
+    """(half of a window, those of `half` that it is for): windows a fifth apart, since each costs a transform."""
+    classes = np.floor(np.log(half) / math.log(COARSER))
+    for one in np.unique(classes):
+        yield max(math.floor(COARSER**one), 1), np.flatnonzero(classes == one)
+
+
+def _weights(run: _Cells, half: int) -> np.ndarray:
+    """Readings in each cell over those in the cells at most `half` from it."""
+    total = np.concatenate([[0], np.cumsum(run.counts)])
+    last = np.searchsorted(run.where, run.where + half, side="right")
+    return np.asarray(run.counts / (total[last] - total[np.searchsorted(run.where, run.where - half)]))
+
+
+def _on_levels_throughout(readings: Sequence[Array], increment: float, sigma: float) -> bool:
+    """Whether no more readings are between levels than one at each change of the level."""
+    between, changes, least = 0, 0, max(BETWEEN * sigma, NEAR * increment)
+    for one in readings:
+        turns = np.exp(2j * np.pi * (one - one[0]) / increment)
+        # The level of most readings is one of a run's levels, wherever its zero is.
+        phase = float(np.angle(turns.sum())) / (2.0 * np.pi)
+        levels = (one - one[0]) / increment - phase
+        between += int((np.abs(levels - np.round(levels)) * increment > least).sum())
+        changes += int(np.abs(np.diff(np.round(levels))).sum())
+    return between <= changes + FEW * sum(len(one) for one in readings)
