@@ -35,6 +35,7 @@ from smajax.attribution.joint_stage import (
     base_alone,
     likeliest_so_far,
     search_again,
+    search_beside_a_record,
     search_by_evidence,
     search_without,
 )
@@ -107,7 +108,7 @@ def close_loop(  # keywords, which a caller names one by one
         context.setting.progress(Result(wrong))
         right, errors = corrected(context.job.experiment, wrong), (*context.record_errors, wrong)
         context = prepared(right, cache, context.setting.progress, seed, settings, interim, record_errors=errors)
-        context, outcome = searched_finely(context)
+        context, outcome = searched_finely(context, None if wrong.instead_of else outcome)
     if interim is not None and not context.setting.is_noise(outcome.final):
         interim(known_so_far(context, (outcome.search, outcome.base, outcome.final), Remaining.CHECKS))
     outcome, rejected = against_the_held_out_runs(context, outcome)
@@ -180,10 +181,16 @@ def _now_and_then(context: Context, interim: Interim) -> Callable[[JointSearch, 
     return after_round
 
 
-def searched_finely(context: Context) -> tuple[Context, Outcome]:
-    """The search; where the model that it ends with asks for a finer integration, on from its likeliest models with that."""
+def searched_finely(context: Context, before: Outcome | None = None) -> tuple[Context, Outcome]:
+    """The search; where the model that it ends with asks for a finer integration, on from its likeliest models with that.
+
+    `before`: of the search before a record was corrected beside the effects that it had found, from which this one begins.
+    """
     setting = context.setting
-    outcome = Outcome(*search_by_evidence(setting, context.base))
+    if before is not None and before.final.effects:
+        outcome = Outcome(*search_beside_a_record(setting, context.base, before.search, before.final))
+    else:
+        outcome = Outcome(*search_by_evidence(setting, context.base))
     finer = finer_integration(setting, outcome.final.effects, outcome.final.values, beside_what_is_left=True)
     if finer is None:
         return context, outcome

@@ -22,9 +22,9 @@ from smajax.attribution.findings import (
 )
 from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.job import Job
-from smajax.attribution.joint_stage import final_model, without
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
+from smajax.attribution.optimum import final_model, without
 from smajax.attribution.paired_errors import Comparison, pooled_rms, runs_compared
 from smajax.attribution.residual_diagnostics import diagnosed, noise_by_output
 from smajax.attribution.run_finding import BesideModels

@@ -34,6 +34,7 @@ from smajax.fit.starts import nearest
 USUAL_ROUNDS = "most searches end after 3 to 10"  # of the benchmark: 80 % of them, 6 in the median
 MOST_ROUNDS = 20  # the evidence rises in every one of them, so this only ends what should have ended
 FITTED = 4  # sets a round
+ALONE = 2  # and, beside the base model, of the effects of these sets the likeliest ones alone
 REACH = 5.0  # nats below the best set in the linear model, within which a set is worth a fit
 SETTLED = 0.05  # relative change of the error of a sample
 CERTAIN = 100.0  # nats that the linear model loses without an effect, beyond which no refit makes up for it
@@ -164,7 +165,11 @@ def _climbed(search: JointSearch, present: FittedModel, traces: Traces, error: f
 
 
 def _promising(search: JointSearch, linear: LinearModel, present: FittedModel, error: float) -> list[Subset]:
-    """The likeliest sets of the linear model that were not fitted at this error."""
+    """The likeliest sets of the linear model that were not fitted at this error.
+
+    About a base model that is off by many noises a linear model needs several effects for what one effect does when it is fitted.
+    So there the likeliest effects of these sets are fitted alone as well.
+    """
     ranked = linear.ranked()
     if not ranked:
         return []
@@ -179,6 +184,12 @@ def _promising(search: JointSearch, linear: LinearModel, present: FittedModel, e
             break
         if effects != present.effects and _fresh(search, effects, error):
             sets.setdefault(effects, subset)
+    if not present.effects:
+        single = sorted(
+            {frozenset({one}) for subset in sets.values() for one in subset}, key=lambda one: -linear.log_evidence(one)
+        )
+        for subset in [one for one in single if _fresh(search, _effects(search, one), error)][:ALONE]:
+            sets.setdefault(_effects(search, subset), subset)
     return list(sets.values())
 
 

@@ -5,7 +5,6 @@ Effects whose gain is gone at half the step of the integration are excluded and 
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -20,24 +19,22 @@ from smajax.attribution.joint_search import (
     fitted_alone,
     fitted_from,
     likeliest_alone,
-    noted,
     search_jointly,
 )
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model
-from smajax.attribution.leave_one_run_out import predicting
-from smajax.attribution.model_fits import Evidence, Model, Search, Start
+from smajax.attribution.model_fits import Evidence, Model, Search
+from smajax.attribution.optimum import as_model, final_model, refined, with_no_effect_too_many
+from smajax.attribution.same_as_parameters import said_by_parameters
 from smajax.attribution.step_size_check import gain_kept_at_half_step
 from smajax.attribution.unknown.search import AskedFor, asked_for
 from smajax.attribution.unknown.terms import UNKNOWN
 from smajax.core.whiteness import on_samples
-from smajax.fit.levenberg_marquardt import Fit, FitSettings, levenberg_marquardt
+from smajax.fit.levenberg_marquardt import Fit, FitSettings
 from smajax.model.effects.library import LIBRARY
 from smajax.model.effects.prior_width import CoefficientPrior
 
 LIKELIEST = 4  # sets of effects from which the search goes on with the values of presets free
 FREED_SHARE = 2.0 / 3.0  # of the base error, to which free values of presets lower it where the search begins so
-AS_LIKELY = 0.5  # log odds: of two models that are nearer the search's stays
-SETTLED_COST = 1e-4  # of twice the log-likelihood: the optimum to within a hundredth of a standard error
 
 
 @dataclass
@@ -59,7 +56,7 @@ class _Stage:
             self.settings,
             noise,
             setting.noise_given,
-            excluded=frozenset(self.excluded),
+            excluded=frozenset(self.excluded) | said_by_parameters(joint),
             rounds_before=before,
             thorough=bool(presets) or not setting.presets,  # the last search
         )
@@ -170,35 +167,49 @@ class _Stage:
         return self.setting.all_noise(on_samples(model.residual, mask), mask)
 
     def resumed(
-        self, search: JointSearch, found: FittedModel | None = None, base: np.ndarray | None = None
+        self,
+        search: JointSearch,
+        found: FittedModel | None = None,
+        base: np.ndarray | None = None,
+        most: int = LIKELIEST,
     ) -> tuple[JointSearch, FittedModel]:
-        """(search, likeliest model) from the likeliest sets that `search` has fitted, with the values of presets free.
+        """(search, likeliest model) from the `most` likeliest sets that `search` has fitted, with the values of presets free.
 
         `found`: its likeliest. None: sets that have an excluded effect do not count, and the likeliest of the others is that.
-        `base`: values (P,) of the base model; None: those of `search`.
+        `base`: values (P,) of the base model; None: those of `search`. Unknowns that `search` did not have begin there as well.
         """
         again = self.joint_search(self.setting.presets)
         again.programs = search.programs
-        starts = self._starts(search, found)
+        starts = self._starts(search, found, most, again.excluded)
         if base is not None:
             # What is held now lies where the base model has it.
-            held = [
-                slot
-                for name, slot in again.joint.slots.items()
-                if name not in again.joint.free(tuple(again.joint.coefficients))
-            ]
-            for values in starts.values():
-                values[held] = base[held]
+            free = again.joint.free(tuple(again.joint.coefficients))
+            begin = [name for name in again.joint.slots if name in free and name in search.joint.slots]
+            new, old = ([joint.slots[name] for name in begin] for joint in (again.joint, search.joint))
+            for effects, values in starts.items():
+                starts[effects] = np.array(base)
+                starts[effects][new] = values[old]
             starts[()] = base
         return again, search_jointly(again, starts)
 
-    def _starts(self, search: JointSearch, found: FittedModel | None) -> dict[tuple[str, ...], np.ndarray]:
-        """Values (P,) of the likeliest sets without an excluded effect, the base model and each effect of the likeliest alone among them."""
+    def _starts(
+        self, search: JointSearch, found: FittedModel | None, most: int, excluded: frozenset[str]
+    ) -> dict[tuple[str, ...], np.ndarray]:
+        """Values (P,) of the likeliest sets without an `excluded` effect, the base model and each effect of the likeliest alone among them.
+
+        What values of presets say that are free now is taken out of sets: these values come in its place.
+        """
         fitted = {effects: model for effects, model in search.fitted.items() if not self.excluded & set(effects)}
         error = search.error(found) if found is not None else min(map(search.error, fitted.values()))
-        likeliest = sorted(fitted.values(), key=lambda model: -model.log_evidence(error**2))[:LIKELIEST]
+        # `found` first, however likely the others are: it is what the search goes on from.
+        order = sorted(fitted.values(), key=lambda model: (model is not found, -model.log_evidence(error**2)))
+        likeliest = order[:most]
         alone = [fitted[one,] for one in likeliest[0].effects if (one,) in fitted]
-        return {model.effects: np.array(model.values) for model in (fitted[()], *alone, *likeliest)}
+        begun: dict[tuple[str, ...], np.ndarray] = {}
+        for model in (fitted[()], *alone, *likeliest):
+            effects = search.joint.ordered([one for one in model.effects if one not in excluded])
+            begun.setdefault(effects, search.joint.without(model.values, effects))
+        return begun
 
     def exclude(self, effects: Sequence[str], kept: float) -> None:
         """Effects that keep only that share of their gain at half the step."""
@@ -258,6 +269,18 @@ def search_again(setting: Search, base: Fit, search: JointSearch) -> tuple[Joint
     return _kept_at_half_step(stage, lambda: stage.resumed(search, base=base.values))
 
 
+def search_beside_a_record(
+    setting: Search, base: Fit, search: JointSearch, found: Model
+) -> tuple[JointSearch, Model, Model]:
+    """As `search_by_evidence`, from `found`, which `search` had fitted to a run before its record was corrected, and each of its effects alone.
+
+    Many of these stood in for what was wrong with the record, and what was not is there already.
+    """
+    stage = _Stage(setting, _settings(setting))
+    known = search.fitted[search.joint.ordered(found.effects)]
+    return _kept_at_half_step(stage, lambda: stage.resumed(search, known, base.values, most=1))
+
+
 def _settings(setting: Search) -> FitSettings:
     return FitSettings(tolerance=setting.config.final_convergence, cache=setting.cache, progress=setting.progress)
 
@@ -287,68 +310,6 @@ def _kept_at_half_step(
     return search, first, final
 
 
-def with_no_effect_too_many(search: JointSearch, found: FittedModel) -> FittedModel:
-    """`found`, or the likeliest model where it is likelier once `found` without each of its effects is at its optimum: in the search such fits may have ended early."""
-    left: set[tuple[str, ...]] = set()
-    while found.effects not in left:
-        left.add(found.effects)
-        error = search.error(found)
-        found = refined(search, found, error)
-        for effect in found.effects:
-            without(search, found, effect, error)
-        best = search.best(error)
-        if best.log_evidence(error**2) - found.log_evidence(error**2) > AS_LIKELY:
-            found = noted(search, found, best)
-    search.winner = found.effects
-    return found
-
-
-def refined(search: JointSearch, model: FittedModel, error: float) -> FittedModel:
-    """A fitted model taken to its optimum, which standard errors need; `error` of an independent sample, SI."""
-    joint = dataclasses.replace(search.joint, width_factors=model.width_factors)
-    problem, index = joint.restricted(model.effects)
-    problem = problem.with_noise(error)
-    task = problem.task(model.names, joint.bounds, model.values[index])
-    settings = dataclasses.replace(search.settings, stage="taking the model to its optimum")
-    (fit,) = levenberg_marquardt(problem, [task], settings)
-    values = np.array(model.values)
-    values[index] = fit.values
-    best = fitted_model(joint, model.effects, values, model.effects)
-    if not best.log_evidence(error**2) > model.log_evidence(error**2):
-        return model
-    search.fitted[model.effects] = best
-    return best
-
-
-def final_model(search: JointSearch, setting: Search, found: FittedModel, error: float) -> Model:
-    """A fitted model at its optimum by the runs alone: what is reported is no compromise with a prior.
-
-    But of effects whose priors say how smooth a shape is (`Candidate.keeps_priors`), and of the values of presets.
-    """
-    best = refined(search, found, error)
-    if not best.effects:
-        return as_model(search, best, error)
-    start = Start(best.effects, best.values)
-    stage = "taking the model to the optimum of the runs"
-    level = error / search.noise  # the cost counts noises here
-    settled = SETTLED_COST * level**2
-    enough = setting.config.final_convergence
-    factors = best.width_factors
-    (fit,), _ = setting.fit([start], stage, enough=enough, settled=settled, level=level, width_factors=factors)
-    search.fitted.setdefault(best.effects, best)
-    return as_model(search, fitted_model(search.joint, best.effects, fit.values, best.effects), error)
-
-
-def without(search: JointSearch, model: Model | FittedModel, effect: str, error: float) -> FittedModel:
-    """`model` without one of its effects, at the optimum."""
-    rest = search.joint.ordered([one for one in model.effects if one != effect])
-    fitted = search.fitted.get(rest)
-    if fitted is None:
-        fitted = fitted_model(search.joint, rest, search.joint.without(model.values, rest), model.effects)
-        search.fitted[rest] = fitted
-    return refined(search, fitted, error)  # in the search it may have ended early
-
-
 def effect_probabilities(search: JointSearch, error: float) -> dict[str, float]:
     """Posterior probability of each effect among the models that were fitted; `error` of an independent sample, SI."""
     found: dict[str, float] = {}
@@ -356,27 +317,6 @@ def effect_probabilities(search: JointSearch, error: float) -> dict[str, float]:
         for effect in effects:
             found[effect] = found.get(effect, 0.0) + probability
     return found
-
-
-def as_model(search: JointSearch, fitted: FittedModel, error: float) -> Model:
-    """A fitted model as the later stages take it, the effect that the evidence needs least at the end."""
-    effects = tuple(sorted(fitted.effects, key=lambda effect: -_needed(search, effect, fitted, error)))
-    return dataclasses.replace(predicting(search.joint, fitted, error, search.noise), effects=effects)
-
-
-def _needed(search: JointSearch, effect: str, model: FittedModel, error: float) -> float:
-    """Log evidence of `model` over the likeliest fitted one without `effect`: of its own effects, where any was fitted.
-
-    Else half of the square by which its coefficients are off their base values, in posterior standard deviations together.
-    """
-    rest = tuple(name for name in model.effects if name != effect)
-    if rest in search.fitted:
-        return model.log_evidence(error**2) - search.fitted[rest].log_evidence(error**2)
-    joint = search.joint
-    own = [model.names.index(name) for name in joint.coefficients[effect]]
-    off = np.asarray([joint.deviation(model.names[k], float(model.values[joint.slots[model.names[k]]])) for k in own])
-    covariance = model.covariance(error**2)[np.ix_(own, own)]
-    return float(0.5 * off @ np.linalg.lstsq(covariance, off, rcond=None)[0])
 
 
 def _joined(effects: Sequence[str]) -> str:

@@ -13,8 +13,8 @@ from smajax.attribution.confounders import confounders, overlap, separating_runs
 from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.joint_search import search_jointly
-from smajax.attribution.joint_stage import as_model
 from smajax.attribution.model_fits import Model, Search
+from smajax.attribution.optimum import as_model
 from smajax.core.result_cache import ResultCache
 from smajax.data.experiment.record import Run
 from smajax.fit.levenberg_marquardt import FitSettings

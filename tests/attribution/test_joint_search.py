@@ -13,9 +13,9 @@ from smajax.attribution.detectable_effects import detectable
 from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.joint_parameters import JointParameters, residual_and_columns
 from smajax.attribution.joint_search import search_jointly
-from smajax.attribution.joint_stage import refined, with_no_effect_too_many
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model
 from smajax.attribution.leave_one_run_out import left_out
+from smajax.attribution.optimum import refined, with_no_effect_too_many
 from smajax.attribution.program_fits import models_by_program
 from smajax.attribution.set_starts import PLACES, starts
 from smajax.attribution.subset_evidence import linear_model
@@ -52,6 +52,19 @@ def test_an_effect_that_is_there_is_found_with_its_size() -> None:
     assert values["latent_heat.enthalpy"] == pytest.approx(1.2e4, abs=4.0 * errors["latent_heat.enthalpy"])
     probabilities = search.probabilities(search.error(search.fitted[("latent_heat",)]))
     assert sum(value for effects, value in probabilities.items() if "latent_heat" in effects) > 0.99
+
+
+def test_beside_the_base_model_the_likeliest_effects_of_sets_are_fitted_alone() -> None:
+    """Far off the base model a linear model needs several effects for what one does when it is fitted."""
+    truth = {"rising_convection.slope": 0.02}
+    search, values, _ = _found(truth)
+    sets = [effects for effects, *_ in search.rounds[0].gains]
+    several = {effect for effects in sets if len(effects) > 1 for effect in effects}
+    alone = [effects[0] for effects in sets if len(effects) == 1]
+    assert several
+    assert len(alone) >= joint_search.ALONE
+    assert search.rounds[0].best == ("rising_convection",)
+    assert set(values) == {*truth}
 
 
 def test_while_much_is_left_each_likely_effect_is_fitted_before_the_search_ends(

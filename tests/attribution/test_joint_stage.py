@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib import resources
 from types import SimpleNamespace
 from typing import Any, cast
@@ -17,6 +17,7 @@ from smajax.attribution.config import AttributionConfig
 from smajax.attribution.findings import Findings, LikelierModel, StepDependent
 from smajax.attribution.joint_stage import search_by_evidence
 from smajax.attribution.laplace_evidence import fitted_model
+from smajax.attribution.optimum import as_model
 from smajax.attribution.unknown.search import AskedFor, Lacking
 from smajax.core.progress import quiet
 from smajax.core.result_cache import ResultCache
@@ -209,28 +210,51 @@ def test_the_second_search_is_without_what_looks_like_what_the_first_has_found(m
     assert excluded == [set(), {"coulomb_friction", "pulley_friction", "sensor_backlash"}]
 
 
-def test_with_a_finer_integration_the_search_goes_on_from_the_likeliest_models(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of these the base model begins where that integration has fitted it."""
+def _begun(
+    monkeypatch: pytest.MonkeyPatch, then: Callable[[Any, Any, Any], object]
+) -> dict[tuple[str, ...], np.ndarray]:
+    """Where the search begins that `then` makes of (setting, base, a search that has fitted three sets), whose runs have an unknown of their own since."""
     fitted = {FEW[:count]: _model(FEW[:count], 9.0 - count, 5.0) for count in range(3)}
-    search = cast(Any, SimpleNamespace(fitted=fitted, error=lambda _: 1.0, excluded=frozenset(), programs=()))
-    begun: list[Any] = []
-    joint = SimpleNamespace(
-        slots={"fitted": 0, "held": 1, "coefficient": 2}, coefficients={}, free=lambda _: ["fitted", "coefficient"]
+    before = SimpleNamespace(
+        slots={"held": 0, "fitted": 1, "coefficient": 2}, ordered=tuple, without=lambda values, _: np.array(values)
     )
-    monkeypatch.setattr(joint_stage._Stage, "joint_search", lambda *_: SimpleNamespace(programs=(), joint=joint))
+    search = SimpleNamespace(fitted=fitted, error=lambda _: 1.0, excluded=frozenset(), programs=(), joint=before)
+    begun: list[dict[tuple[str, ...], np.ndarray]] = []
+    joint = SimpleNamespace(
+        slots={"fitted": 0, "held": 1, "new": 2, "coefficient": 3},
+        coefficients={},
+        free=lambda _: ["fitted", "new", "coefficient"],
+    )
+    again = SimpleNamespace(programs=(), joint=joint, excluded=frozenset())
+    monkeypatch.setattr(joint_stage._Stage, "joint_search", lambda *_: again)
     monkeypatch.setattr(joint_stage, "search_jointly", lambda _, starts: begun.append(starts))
     monkeypatch.setattr(joint_stage, "_kept_at_half_step", lambda _, searched: searched())
-    base = SimpleNamespace(values=np.ones(3))
-    joint_stage.search_again(
-        cast(Any, SimpleNamespace(presets={}, config=AttributionConfig(), cache=None, progress=quiet)),
-        cast(Any, base),
-        search,
-    )
+    setting = SimpleNamespace(presets={}, config=AttributionConfig(), cache=None, progress=quiet)
+    then(setting, SimpleNamespace(values=np.ones(4)), search)
     (starts,) = begun
-    assert set(starts) == set(fitted)
-    assert starts[()] is base.values
-    # What is not free now lies where the base model has it.
-    assert [values.tolist() for effects, values in starts.items() if effects] == [[0.0, 1.0, 0.0]] * 2
+    return starts
+
+
+def test_with_a_finer_integration_the_search_goes_on_from_the_likeliest_models(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of these the base model begins where that integration has fitted it."""
+    starts = _begun(monkeypatch, cast(Any, joint_stage.search_again))
+    assert set(starts) == {(), FEW[:1], FEW[:2]}
+    assert starts[()].tolist() == [1.0] * 4
+    # What is not free now, and what there was not before, lies where the base model has it.
+    assert [values.tolist() for effects, values in starts.items() if effects] == [[0.0, 1.0, 1.0, 0.0]] * 2
+
+
+def test_with_a_record_corrected_the_search_begins_at_the_effects_beside_which_it_was_wrong(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """And at each of them alone, where it was fitted: most may have stood in for the record."""
+    starts = _begun(
+        monkeypatch,
+        lambda setting, base, search: joint_stage.search_beside_a_record(
+            setting, base, search, cast(Any, SimpleNamespace(effects=FEW[:2]))
+        ),
+    )
+    assert list(starts) == [(), FEW[:1], FEW[:2]]
 
 
 def test_effects_stand_by_how_much_the_model_needs_them_even_where_it_was_never_fitted_without() -> None:
@@ -242,4 +266,4 @@ def test_effects_stand_by_how_much_the_model_needs_them_even_where_it_was_never_
         values[search.joint.slots[name]] = value
     effects = ("latent_heat", "phase_resistance")
     search.fitted[effects] = fitted_model(search.joint, effects, values, effects)
-    assert joint_stage.as_model(search, search.fitted[effects], NOISE).effects == effects[::-1]
+    assert as_model(search, search.fitted[effects], NOISE).effects == effects[::-1]

@@ -132,6 +132,8 @@ class Candidate:
     exclusive_group: str = ""
     # What it looks like in a log, where several effects that do not exclude each other look much the same: in the place of one that was added each of the others is tried.
     similar_group: str = ""
+    # Parameters of the base model that say all that its coefficients say where a fit has every one of them free: then it is nothing of its own.
+    same_as: tuple[str, ...] = ()
     # Whether its priors take part in the fit whose values are reported as well: they say how smooth a shape is, which the runs alone
     # do not determine.
     keeps_priors: bool = False

@@ -17,7 +17,8 @@ class UnequalStressSlopes(AbstractEffect, RangeTerm):
     r"""$y_A = T - (1 + a) \sigma/C_A$, $y_M = T - (1 + b) \sigma/C_M$: stress moves each range by an amount of its own.
 
     C_A and C_M are parameters of the base model and equal in every preset; this says that they differ, from the preset's
-    and from each other. Where an experiment fits one of them, that parameter tells it all and the coefficient nothing.
+    and from each other. Where a fit has both free, as unknowns or as values of a preset that nobody measured on this wire, these
+    parameters tell it all, and it is not looked for.
     """
 
     heating: Scalar = parameter(
@@ -38,6 +39,7 @@ class UnequalStressSlopes(AbstractEffect, RangeTerm):
         switches=("heating", "cooling"),
         initial_guess={"heating": 0.1, "cooling": 0.1},
         observable=several_forces,
+        same_as=("stress_slope_austenite", "stress_slope_martensite"),
         prior_class="material",
         widths={
             "heating": Width(

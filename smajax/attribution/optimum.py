@@ -1,0 +1,100 @@
+"""Fitted models at their optimum, and as the later stages of `close-loop` take them: in the search a fit may have ended early."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from smajax.attribution.fitted_sets import JointSearch
+from smajax.attribution.joint_search import noted
+from smajax.attribution.laplace_evidence import FittedModel, fitted_model
+from smajax.attribution.leave_one_run_out import predicting
+from smajax.attribution.model_fits import Model, Search, Start
+from smajax.fit.levenberg_marquardt import levenberg_marquardt
+
+AS_LIKELY = 0.5  # log odds: of two models that are nearer the search's stays
+SETTLED_COST = 1e-4  # of twice the log-likelihood: the optimum to within a hundredth of a standard error
+
+
+def with_no_effect_too_many(search: JointSearch, found: FittedModel) -> FittedModel:
+    """`found`, or the likeliest model where it is likelier once `found` without each of its effects is at its optimum: in the search such fits may have ended early."""
+    left: set[tuple[str, ...]] = set()
+    while found.effects not in left:
+        left.add(found.effects)
+        error = search.error(found)
+        found = refined(search, found, error)
+        for effect in found.effects:
+            without(search, found, effect, error)
+        best = search.best(error)
+        if best.log_evidence(error**2) - found.log_evidence(error**2) > AS_LIKELY:
+            found = noted(search, found, best)
+    search.winner = found.effects
+    return found
+
+
+def refined(search: JointSearch, model: FittedModel, error: float) -> FittedModel:
+    """A fitted model taken to its optimum, which standard errors need; `error` of an independent sample, SI."""
+    joint = dataclasses.replace(search.joint, width_factors=model.width_factors)
+    problem, index = joint.restricted(model.effects)
+    problem = problem.with_noise(error)
+    task = problem.task(model.names, joint.bounds, model.values[index])
+    settings = dataclasses.replace(search.settings, stage="taking the model to its optimum")
+    (fit,) = levenberg_marquardt(problem, [task], settings)
+    values = np.array(model.values)
+    values[index] = fit.values
+    best = fitted_model(joint, model.effects, values, model.effects)
+    if not best.log_evidence(error**2) > model.log_evidence(error**2):
+        return model
+    search.fitted[model.effects] = best
+    return best
+
+
+def final_model(search: JointSearch, setting: Search, found: FittedModel, error: float) -> Model:
+    """A fitted model at its optimum by the runs alone: what is reported is no compromise with a prior.
+
+    But of effects whose priors say how smooth a shape is (`Candidate.keeps_priors`), and of the values of presets.
+    """
+    best = refined(search, found, error)
+    if not best.effects:
+        return as_model(search, best, error)
+    start = Start(best.effects, best.values)
+    stage = "taking the model to the optimum of the runs"
+    level = error / search.noise  # the cost counts noises here
+    settled = SETTLED_COST * level**2
+    enough = setting.config.final_convergence
+    factors = best.width_factors
+    (fit,), _ = setting.fit([start], stage, enough=enough, settled=settled, level=level, width_factors=factors)
+    search.fitted.setdefault(best.effects, best)
+    return as_model(search, fitted_model(search.joint, best.effects, fit.values, best.effects), error)
+
+
+def without(search: JointSearch, model: Model | FittedModel, effect: str, error: float) -> FittedModel:
+    """`model` without one of its effects, at the optimum."""
+    rest = search.joint.ordered([one for one in model.effects if one != effect])
+    fitted = search.fitted.get(rest)
+    if fitted is None:
+        fitted = fitted_model(search.joint, rest, search.joint.without(model.values, rest), model.effects)
+        search.fitted[rest] = fitted
+    return refined(search, fitted, error)  # in the search it may have ended early
+
+
+def as_model(search: JointSearch, fitted: FittedModel, error: float) -> Model:
+    """A fitted model as the later stages take it, the effect that the evidence needs least at the end."""
+    effects = tuple(sorted(fitted.effects, key=lambda effect: -_needed(search, effect, fitted, error)))
+    return dataclasses.replace(predicting(search.joint, fitted, error, search.noise), effects=effects)
+
+
+def _needed(search: JointSearch, effect: str, model: FittedModel, error: float) -> float:
+    """Log evidence of `model` over the likeliest fitted one without `effect`: of its own effects, where any was fitted.
+
+    Else half of the square by which its coefficients are off their base values, in posterior standard deviations together.
+    """
+    rest = tuple(name for name in model.effects if name != effect)
+    if rest in search.fitted:
+        return model.log_evidence(error**2) - search.fitted[rest].log_evidence(error**2)
+    joint = search.joint
+    own = [model.names.index(name) for name in joint.coefficients[effect]]
+    off = np.asarray([joint.deviation(model.names[k], float(model.values[joint.slots[model.names[k]]])) for k in own])
+    covariance = model.covariance(error**2)[np.ix_(own, own)]
+    return float(0.5 * off @ np.linalg.lstsq(covariance, off, rcond=None)[0])
