@@ -7,6 +7,7 @@ import time as clock
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import jax.numpy as jnp
@@ -43,7 +44,7 @@ from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.neutral_at_base import check_neutral
 from smajax.attribution.outlier_run import outlier_runs
-from smajax.attribution.record_error import RecordError
+from smajax.attribution.record_error import FoundRecordError, RecordError
 from smajax.attribution.saved_model import fit_run_states, saved_model
 from smajax.attribution.step_size_check import finer_integration, integration_error_of
 from smajax.attribution.unknown.search import Lacking, in_place_of, unknown_terms
@@ -105,10 +106,10 @@ def close_loop(  # keywords, which a caller names one by one
     context, outcome = searched_finely(context)
     while len(context.record_errors) < MOST_RECORD_ERRORS and (wrong := wrong_record(context, outcome)) is not None:
         # All else is asked of the runs as they should have been recorded.
-        context.setting.progress(Result(wrong))
-        right, errors = corrected(context.job.experiment, wrong), (*context.record_errors, wrong)
+        context.setting.progress(Result(wrong.error))
+        right, errors = corrected(context.job.experiment, wrong.error), (*context.record_errors, wrong.error)
         context = prepared(right, cache, context.setting.progress, seed, settings, interim, record_errors=errors)
-        context, outcome = searched_finely(context, None if wrong.instead_of else outcome)
+        context, outcome = searched_finely(context, (outcome.search, wrong.beside))
     if interim is not None and not context.setting.is_noise(outcome.final):
         interim(known_so_far(context, (outcome.search, outcome.base, outcome.final), Remaining.CHECKS))
     outcome, rejected = against_the_held_out_runs(context, outcome)
@@ -163,6 +164,8 @@ def prepared(  # the stage's inputs, each once
     progress(Result(checks))
     context = Context(job, setting, start, base, seed, checks, interim, record_errors)
     setting.after_round = None if interim is None else _now_and_then(context, interim)
+    if len(record_errors) < MOST_RECORD_ERRORS:
+        setting.wrong_record = partial(record_error, setting, runs=job.fit_runs)
     return context
 
 
@@ -181,16 +184,20 @@ def _now_and_then(context: Context, interim: Interim) -> Callable[[JointSearch, 
     return after_round
 
 
-def searched_finely(context: Context, before: Outcome | None = None) -> tuple[Context, Outcome]:
+def searched_finely(
+    context: Context, before: tuple[JointSearch, tuple[str, ...]] | None = None
+) -> tuple[Context, Outcome]:
     """The search; where the model that it ends with asks for a finer integration, on from its likeliest models with that.
 
-    `before`: of the search before a record was corrected beside the effects that it had found, from which this one begins.
+    `before`: the search before a record was corrected, and the effects beside which it was wrong, from which this one begins.
     """
     setting = context.setting
-    if before is not None and before.final.effects:
-        outcome = Outcome(*search_beside_a_record(setting, context.base, before.search, before.final))
-    else:
+    if before is None:
         outcome = Outcome(*search_by_evidence(setting, context.base))
+    else:
+        outcome = Outcome(*search_beside_a_record(setting, context.base, *before))
+    if outcome.search.wrong_record is not None:
+        return context, outcome
     finer = finer_integration(setting, outcome.final.effects, outcome.final.values, beside_what_is_left=True)
     if finer is None:
         return context, outcome
@@ -200,12 +207,14 @@ def searched_finely(context: Context, before: Outcome | None = None) -> tuple[Co
     return context, Outcome(*search_again(context.setting, context.base, outcome.search))
 
 
-def wrong_record(context: Context, outcome: Outcome) -> RecordError | None:
-    """An input of one run that was recorded wrongly; asked where something is missing."""
+def wrong_record(context: Context, outcome: Outcome) -> FoundRecordError | None:
+    """An input of one run that was recorded wrongly; asked where something is missing, if the search has not found one."""
     setting, base, final = context.setting, outcome.base, outcome.final
+    if outcome.search.wrong_record is not None:
+        return outcome.search.wrong_record
     if not final.effects and setting.is_noise(final):
         return None
-    return record_error(setting, base, final, context.job.fit_runs)
+    return record_error(setting, [base, final] if final.effects else [base], context.job.fit_runs)
 
 
 def against_the_held_out_runs(context: Context, outcome: Outcome) -> tuple[Outcome, tuple[Rejected, ...]]:

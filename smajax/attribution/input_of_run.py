@@ -26,7 +26,7 @@ from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model, independent_error
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.program_fits import comparison_settings
-from smajax.attribution.record_error import RecordError
+from smajax.attribution.record_error import FoundRecordError, RecordError
 from smajax.core.names_of_runs import of_run
 from smajax.core.parameters import parameters
 from smajax.data.experiment.record import Experiment, Prior, Run, Unknown
@@ -51,6 +51,9 @@ MOST_SHARES = (
     (16, 0.1),
 )  # after so many steps a fit ends that leaves more than this share of the squares
 LEAST_RUNS = 3  # of two runs that disagree either may be the wrong one
+
+
+Host = Model | FittedModel  # a model beside which an error of a record is sought
 
 
 class Kind(NamedTuple):
@@ -86,14 +89,14 @@ class _EventParameters(JointParameters):
         return same, np.arange(len(own.names))
 
 
-def record_error(setting: Search, base: Model, final: Model, runs: Sequence[Run]) -> RecordError | None:
-    """The likeliest error of the record of one fit run, where it is likelier than `final` by `LEAST_ODDS`; `runs` of the fit, in order.
+def record_error(setting: Search, hosts: Sequence[Host], runs: Sequence[Run]) -> FoundRecordError | None:
+    """The likeliest error of the record of one fit run, where it is likelier than the last of `hosts` by `LEAST_ODDS`; `runs` of the fit, in order.
 
-    Beside the base model, in the place of all effects of `final`, and beside `final`.
+    It is sought beside each of `hosts`, in the place of all effects that the last one has beside theirs.
     """
     if len(runs) < LEAST_RUNS:
         return None
-    hosts = [base, final] if final.effects else [base]
+    final = hosts[-1]
     fits = [(host, *one) for host in hosts for one in _fits(setting, host, [run.name for run in runs])]
     if not fits:
         return None
@@ -106,16 +109,17 @@ def record_error(setting: Search, base: Model, final: Model, runs: Sequence[Run]
     if ahead < LEAST_ODDS or model.rms > MOST_LEFT * float(setting.problem.noise_sigma):
         return None
     run = next(one for one in runs if one.name == event.run)
-    return RecordError(
+    found = RecordError(
         run.name,
         _channel(setting.problem.system, event.coefficient, run),
         event.coefficient,
         event.value,
         model.standard_errors(error**2)[event.name],
         ahead,
-        () if host.effects else final.effects,
+        tuple(effect for effect in final.effects if effect not in host.effects),
         float(run.time[-1] - run.time[0]),
     )
+    return FoundRecordError(found, host.effects)
 
 
 class _Event(NamedTuple):
@@ -128,7 +132,7 @@ class _Event(NamedTuple):
         return f"{self.coefficient}[{self.run}]"
 
 
-def _fits(setting: Search, host: Model, runs: Sequence[str]) -> list[tuple[_Event, FittedModel]]:
+def _fits(setting: Search, host: Host, runs: Sequence[str]) -> list[tuple[_Event, FittedModel]]:
     """`host` with each kind of error in each of the runs that it leaves most of, fitted."""
     own, slots = setting.restricted(host.effects)
     system = own.system_at(jnp.asarray(host.values[slots]))
@@ -180,7 +184,7 @@ def _possible(kind: Kind, system: System) -> bool:
 
 
 def _with_events(
-    setting: Search, host: Model, problem: Problem, events: Mapping[str, tuple[Kind, str]]
+    setting: Search, host: Host, problem: Problem, events: Mapping[str, tuple[Kind, str]]
 ) -> _EventParameters:
     """Parameters of models with the effects of `host` and one of `events`, with their priors."""
     plain = setting.joint(host.effects)

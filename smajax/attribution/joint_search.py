@@ -68,6 +68,8 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
     widened: set[tuple[str, ...]] = set()  # models beside which several effects at once were tried
     shapes: set[tuple[str, ...]] = set()  # effects of groups of these, and of what was searched around in their place
     for number in range(MOST_ROUNDS):
+        if len(present.effects) >= MANY and search.has_wrong_record(present):
+            break
         if present.effects in checked or any(len(effects) >= MANY for effects in left):
             # Not before a round has removed what a model of many effects has too much.
             other = search.in_place_of_many(present)

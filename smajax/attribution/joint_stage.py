@@ -43,6 +43,9 @@ class _Stage:
     settings: FitSettings
     excluded: set[str] = field(default_factory=set)
     asked: list[AskedFor] = field(default_factory=list)  # unknown terms beside the base model, once they were asked for
+    records_asked: list[tuple[str, ...]] = field(
+        default_factory=list
+    )  # effects beside which records of single runs were
 
     def joint_search(self, presets: Mapping[str, CoefficientPrior]) -> JointSearch:
         """Among the candidates that were not excluded."""
@@ -64,6 +67,7 @@ class _Stage:
         if search.thorough:  # else values of presets are held, which no function is beside
             search.in_place_of_many = partial(self.in_place_of_many, search)
             search.before_the_end = partial(self.before_the_end, search)
+            search.has_wrong_record = partial(self.has_wrong_record, search)
         return search
 
     def searched(self, base: np.ndarray) -> tuple[JointSearch, FittedModel]:
@@ -77,12 +81,14 @@ class _Stage:
         """
         search, found = self._from_base(base, ())
         doubted = [effect for effect in found.effects if LIBRARY[effect].candidate.prior_class != "material"]
-        if not doubted or len(found.effects) >= MANY or self._leaves_noise(found):
+        if not doubted or search.wrong_record or len(found.effects) >= MANY or self._leaves_noise(found):
             return search, found
         # And without what looks much the same, which has been tried in their place.
         alike = {name for name in search.joint.coefficients for one in doubted if replaceable(name, one)}
-        rest = _Stage(self.setting, self.settings, self.excluded | alike | set(doubted), self.asked)
+        rest = _Stage(self.setting, self.settings, self.excluded | alike | set(doubted), self.asked, self.records_asked)
         other, instead = rest._from_base(base, search.programs)
+        if other.wrong_record:
+            return other, instead
         search.fitted = {**other.fitted, **search.fitted}
         error = search.error(search.best(search.error(found)))
         if instead.log_evidence(error**2) <= found.log_evidence(error**2):
@@ -121,6 +127,20 @@ class _Stage:
         if named is None or not self._leaves_noise(named) or not self._likelier(search, found, [named]):
             return None
         return self._one_effect(search, found, [named]) or found
+
+    def has_wrong_record(self, search: JointSearch, found: FittedModel) -> bool:
+        """Whether an input of one run was recorded wrongly, asked once, where `found` has many effects and leaves more than noise.
+
+        They may stand in for it, and each round about them costs more than to ask. It is sought beside the base model, the likeliest model of few effects, and `found`.
+        """
+        if self.setting.wrong_record is None or self.records_asked or self._leaves_noise(found):
+            return False
+        self.records_asked.append(found.effects)
+        few = [one for one in search.fitted.values() if 0 < len(one.effects) < MANY]
+        variance = min(map(search.error, few), default=1.0) ** 2
+        likeliest = sorted(few, key=lambda one: -one.log_evidence(variance))[:1]
+        search.wrong_record = self.setting.wrong_record([search.fitted[()], *likeliest, found])
+        return search.wrong_record is not None
 
     def before_the_end(self, search: JointSearch, found: FittedModel) -> FittedModel | None:
         """One effect that is likelier than those of `found`, in an equation where an unknown function is likelier than these too."""
@@ -257,6 +277,7 @@ def search_without(setting: Search, search: JointSearch, effects: Sequence[str])
     What is left of the likeliest set when one effect is taken out is rarely the likeliest without it: the others were chosen beside it.
     """
     stage = _Stage(setting, _settings(setting), {*search.excluded, *effects})
+    stage.records_asked.append(())  # records of fit runs are no longer corrected once held-out runs have been looked at
     return _kept_at_half_step(stage, lambda: stage.resumed(search))
 
 
@@ -270,14 +291,16 @@ def search_again(setting: Search, base: Fit, search: JointSearch) -> tuple[Joint
 
 
 def search_beside_a_record(
-    setting: Search, base: Fit, search: JointSearch, found: Model
+    setting: Search, base: Fit, search: JointSearch, effects: Sequence[str]
 ) -> tuple[JointSearch, Model, Model]:
-    """As `search_by_evidence`, from `found`, which `search` had fitted to a run before its record was corrected, and each of its effects alone.
+    """As `search_by_evidence`, from the model with `effects`, which `search` had fitted before the record of a run was corrected, and each of these alone.
 
-    Many of these stood in for what was wrong with the record, and what was not is there already.
+    Some of these may have stood in for what was wrong with the record, and what did not is there already.
     """
+    if not effects:
+        return search_by_evidence(setting, base)
     stage = _Stage(setting, _settings(setting))
-    known = search.fitted[search.joint.ordered(found.effects)]
+    known = search.fitted[search.joint.ordered(effects)]
     return _kept_at_half_step(stage, lambda: stage.resumed(search, known, base.values, most=1))
 
 
@@ -292,6 +315,9 @@ def _kept_at_half_step(
     setting = stage.setting
     while True:
         search, found = searched()
+        if search.wrong_record is not None:  # nothing is said of these models: they are fitted again
+            error = search.error(found)
+            return search, as_model(search, search.fitted[()], error), as_model(search, found, error)
         found = with_no_effect_too_many(search, found)
         error = search.error(found)
         base_model = refined(search, search.fitted[()], search.error_of(()))

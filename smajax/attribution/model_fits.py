@@ -19,6 +19,7 @@ from smajax.attribution.declared_priors import NONE_DECLARED
 from smajax.attribution.every_effect import EVERY
 from smajax.attribution.findings import Reason, Round
 from smajax.attribution.joint_parameters import JointParameters
+from smajax.attribution.record_error import FoundRecordError
 from smajax.attribution.residual_diagnostics import noise_by_output
 from smajax.attribution.run_extent import extent_of
 from smajax.attribution.score_test import switches
@@ -92,6 +93,8 @@ class Search:
     of_unknowns: Mapping[str, CoefficientPrior] = field(default_factory=dict)  # the same of unknowns that have one
     # Gets a joint search and its likeliest model (`FittedModel`) after each of its rounds.
     after_round: Callable[[Any, Any], object] | None = None
+    # An input of one run that was recorded wrongly, of some models the last of which the search has come to; None: it is not asked for.
+    wrong_record: Callable[[Sequence[Any]], FoundRecordError | None] | None = None
 
     def note(self, done: Round) -> None:
         """Record a round and report it."""

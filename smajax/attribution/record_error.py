@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 
 @dataclass(frozen=True)
@@ -17,6 +18,13 @@ class RecordError:
     log_odds: float  # over the model that it takes the place of, or stands beside
     instead_of: tuple[str, ...]  # effects that the search had named in its place
     seconds: float  # length of the run
+
+
+class FoundRecordError(NamedTuple):
+    """A record's error, and the effects of the model that it was found beside."""
+
+    error: RecordError
+    beside: tuple[str, ...]
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from smajax.attribution.findings import Findings, LikelierModel, StepDependent
 from smajax.attribution.joint_stage import search_by_evidence
 from smajax.attribution.laplace_evidence import fitted_model
 from smajax.attribution.optimum import as_model
+from smajax.attribution.record_error import FoundRecordError, RecordError
 from smajax.attribution.unknown.search import AskedFor, Lacking
 from smajax.core.progress import quiet
 from smajax.core.result_cache import ResultCache
@@ -134,6 +135,7 @@ def _stage_and_search(
         fitted={(): _model((), 9.0, 0.0)},
         error=lambda model: float(model.residual[0]),
         lacking=None,
+        wrong_record=None,
         joint=SimpleNamespace(coefficients=("latent_heat", "sensor_drift", "sensor_gain")),
         excluded=frozenset({"sensor_gain"}),
     )
@@ -141,6 +143,7 @@ def _stage_and_search(
 
 
 THREE = ("latent_heat", "creep", "radiation")
+FOUND = FoundRecordError(RecordError("steps", "voltage", "input_delay.delay", 0.8, 1e-3, 50.0, (), 60.0), ())
 
 
 @pytest.mark.parametrize(
@@ -210,6 +213,26 @@ def test_the_second_search_is_without_what_looks_like_what_the_first_has_found(m
     assert excluded == [set(), {"coulomb_friction", "pulley_friction", "sensor_backlash"}]
 
 
+def test_a_wrong_record_is_asked_for_once_where_many_effects_leave_more_than_noise(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Beside the base model, the likeliest of few effects, and the many: the search ends where it is found."""
+    stage, search, _ = _stage_and_search(monkeypatch, [], [])
+    asked: list[list[tuple[str, ...]]] = []
+
+    def wrong_record(hosts: Sequence[Any]) -> Any:
+        asked.append([one.effects for one in hosts])
+        return FOUND
+
+    stage.setting.wrong_record = wrong_record
+    search.fitted |= {effects: _model(effects, 5.0, odds) for effects, odds in ((THREE[:1], 3.0), (THREE[1:], 1.0))}
+    assert not stage.has_wrong_record(search, cast(Any, _model(THREE, 1.0, 9.0)))  # nothing is missing
+    assert stage.has_wrong_record(search, cast(Any, _model(THREE, 5.0, 9.0)))
+    assert search.wrong_record is FOUND
+    assert not stage.has_wrong_record(search, cast(Any, _model(THREE, 5.0, 9.0)))
+    assert asked == [[(), THREE[:1], THREE]]
+
+
 def _begun(
     monkeypatch: pytest.MonkeyPatch, then: Callable[[Any, Any, Any], object]
 ) -> dict[tuple[str, ...], np.ndarray]:
@@ -250,9 +273,7 @@ def test_with_a_record_corrected_the_search_begins_at_the_effects_beside_which_i
     """And at each of them alone, where it was fitted: most may have stood in for the record."""
     starts = _begun(
         monkeypatch,
-        lambda setting, base, search: joint_stage.search_beside_a_record(
-            setting, base, search, cast(Any, SimpleNamespace(effects=FEW[:2]))
-        ),
+        lambda setting, base, search: joint_stage.search_beside_a_record(setting, base, search, FEW[:2]),
     )
     assert list(starts) == [(), FEW[:1], FEW[:2]]
 
