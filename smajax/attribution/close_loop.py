@@ -45,6 +45,7 @@ from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.neutral_at_base import check_neutral
 from smajax.attribution.outlier_run import outlier_runs
 from smajax.attribution.record_error import FoundRecordError, RecordError
+from smajax.attribution.same_as_parameters import said_by_parameters
 from smajax.attribution.saved_model import fit_run_states, saved_model
 from smajax.attribution.step_size_check import finer_integration, integration_error_of
 from smajax.attribution.unknown.search import Lacking, in_place_of, unknown_terms
@@ -159,7 +160,13 @@ def prepared(  # the stage's inputs, each once
     values = dict(zip(job.problem.names, base.values.tolist(), strict=True))
     setting.presets = visible(at_fit, values, job.presets)
     identifiable = identifiability(at_fit, job.unknowns, job.bounds, TakenAt.BASE_FIT)
-    checks = Checks(identifiable, hidden_by_one_force=job.hidden_by_one_force, freed_later=tuple(setting.presets))
+    joint = setting.joint(setting.candidates)
+    checks = Checks(
+        identifiable,
+        hidden_by_one_force=job.hidden_by_one_force,
+        freed_later=tuple(setting.presets),
+        said_by_parameters=joint.ordered(tuple(said_by_parameters(joint))),
+    )
     progress(Stage(CHECKING, 1.0))
     progress(Result(checks))
     context = Context(job, setting, start, base, seed, checks, interim, record_errors)

@@ -53,6 +53,7 @@ class Checks:
     held_presets: tuple[str, ...] = ()  # values that the file does not give, held at those of the presets
     hidden_by_one_force: tuple[str, ...] = ()  # effects that only runs under another load could show
     freed_later: tuple[str, ...] = ()  # values that the file does not give, held here and fitted by what follows
+    said_by_parameters: tuple[str, ...] = ()  # effects that parameters of the base model say which are fitted
 
 
 def _correlated(covariance: np.ndarray, names: Sequence[str]) -> tuple[CorrelatedGroup, ...]:

@@ -63,6 +63,9 @@ def _determined(checks: Checks) -> Iterator[str]:
             f"In all fit runs the load pulls with the same force, so what depends on the stress cannot show: {titles} are not looked for. "
             "Runs under another load would show them."
         )
+    for name in checks.said_by_parameters:
+        effect = LIBRARY[name].candidate
+        yield f"{effect.title[0].upper()}{effect.title[1:]}: not looked for, because the search fits {and_listed(effect.same_as)}, which say the same."
 
 
 def identifiability_sentences(found: Identifiability) -> list[str]:

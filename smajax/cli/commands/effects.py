@@ -74,6 +74,7 @@ def _entry(effect: type[AbstractEffect]) -> dict[str, Any]:
         "meaning": candidate.sentence,
         "exclusive_group": candidate.exclusive_group,
         "similar_group": candidate.similar_group,
+        "same_as": list(candidate.same_as),
         "prior": {"class": candidate.prior_class, "odds": PRIOR_ODDS[candidate.prior_class]},
         "parameters": entries,
     }
@@ -96,6 +97,8 @@ def _text(effect: type[AbstractEffect]) -> str:
         lines.append(
             f"  Effects of this group look much the same in a log, and each is tried in the place of another: {candidate.similar_group}."
         )
+    if candidate.same_as:
+        lines.append(f"  Not looked for where a fit has {' and '.join(candidate.same_as)} free, which says the same.")
     for name, entry in parameters(effect.base()).items():
         width = stated_width(effect, name.split(".", 1)[1])
         lines += [

@@ -12,7 +12,11 @@ from smajax.model.wire.resistance import ResistanceTerm
 
 
 class PhaseResistance(AbstractEffect, ResistanceTerm):
-    r"""$R = R_{base} [1 + a (1 - \xi)]$: eq. 3.15 with a phase contrast of its own."""
+    r"""$R = R_{base} [1 + a (1 - \xi)]$: eq. 3.15 with a phase contrast of its own.
+
+    The base model has a resistivity of each phase. Where a fit has that of austenite free, it tells all that the contrast does, and this is not
+    looked for.
+    """
 
     contrast: Scalar = parameter("-", -0.5, 0.5, "a: relative change of R from martensite to austenite", default=0.0)
 
@@ -25,6 +29,7 @@ class PhaseResistance(AbstractEffect, ResistanceTerm):
         "transforms.",
         switches=("contrast",),
         initial_guess={"contrast": -0.1},
+        same_as=("resistivity_austenite",),
         prior_class="material",
         widths={
             "contrast": Width(
