@@ -277,6 +277,8 @@ def search_without(setting: Search, search: JointSearch, effects: Sequence[str])
     What is left of the likeliest set when one effect is taken out is rarely the likeliest without it: the others were chosen beside it.
     """
     stage = _Stage(setting, _settings(setting), {*search.excluded, *effects})
+    if search.lacking is not None:
+        stage.asked.append(search.lacking)  # of the same base model
     stage.records_asked.append(())  # records of fit runs are no longer corrected once held-out runs have been looked at
     return _kept_at_half_step(stage, lambda: stage.resumed(search))
 

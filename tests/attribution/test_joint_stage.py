@@ -278,6 +278,22 @@ def test_with_a_record_corrected_the_search_begins_at_the_effects_beside_which_i
     assert list(starts) == [(), FEW[:1], FEW[:2]]
 
 
+def test_without_what_held_out_runs_reject_nothing_is_asked_for_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Unknown functions beside the base model are those of before, and no fit run's record is corrected any more."""
+    known = AskedFor(None, Lacking())
+    stages: list[Any] = []
+    monkeypatch.setattr(joint_stage._Stage, "resumed", lambda stage, _: stages.append(stage))
+    monkeypatch.setattr(joint_stage, "_kept_at_half_step", lambda _, searched: searched())
+    setting = SimpleNamespace(presets={}, config=AttributionConfig(), cache=None, progress=quiet)
+    search = SimpleNamespace(excluded=frozenset({"creep"}), lacking=known)
+    joint_stage.search_without(cast(Any, setting), cast(Any, search), ["latent_heat"])
+    (stage,) = stages
+    assert stage.excluded == {"creep", "latent_heat"}
+    assert stage.asked == [known]
+    setting.wrong_record = lambda _: pytest.fail("a record was asked for")
+    assert not stage.has_wrong_record(cast(Any, SimpleNamespace()), cast(Any, _model(THREE, 5.0, 9.0)))
+
+
 def test_effects_stand_by_how_much_the_model_needs_them_even_where_it_was_never_fitted_without() -> None:
     """An unfinished page is of such a model; in the library the latent heat stands before the contrast of the resistances."""
     truth = {"latent_heat.enthalpy": 200.0, "phase_resistance.contrast": -0.2}
