@@ -221,7 +221,7 @@ def wrong_record(context: Context, outcome: Outcome) -> FoundRecordError | None:
         return outcome.search.wrong_record
     if not final.effects and setting.is_noise(final):
         return None
-    return record_error(setting, [base, final] if final.effects else [base], context.job.fit_runs)
+    return record_error(setting, [base, final] if final.effects else [base], final, context.job.fit_runs)
 
 
 def against_the_held_out_runs(context: Context, outcome: Outcome) -> tuple[Outcome, tuple[Rejected, ...]]:

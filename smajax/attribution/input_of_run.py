@@ -91,24 +91,23 @@ class _EventParameters(JointParameters):
 
 
 def record_error(
-    setting: Search, hosts: Sequence[Host], runs: Sequence[Run], most_left: float = MOST_LEFT
+    setting: Search, hosts: Sequence[Host], present: Host, runs: Sequence[Run], most_left: float = MOST_LEFT
 ) -> FoundRecordError | None:
-    """The likeliest error of the record of one fit run, where it is likelier than the last of `hosts` by `LEAST_ODDS`; `runs` of the fit, in order.
+    """The likeliest error of the record of one fit run, where it is likelier than `present` by `LEAST_ODDS`; `runs` of the fit, in order.
 
-    It is sought beside each of `hosts`, in the place of all effects that the last one has beside theirs. `most_left`: noises that the model with it may leave.
+    It is sought beside each of `hosts`, in the place of all effects that `present` has beside theirs. `most_left`: noises that the model with it may leave.
     """
     if len(runs) < LEAST_RUNS:
         return None
-    final = hosts[-1]
     fits = [(host, *one) for host in hosts for one in _fits(setting, host, [run.name for run in runs], most_left)]
     if not fits:
         return None
     joint = setting.joint(setting.candidates)
-    present = fitted_model(joint, final.effects, final.values, final.effects)
-    best = min([present, *(model for *_, model in fits)], key=lambda model: model.rms)
+    here = fitted_model(joint, present.effects, present.values, present.effects)
+    best = min([here, *(model for *_, model in fits)], key=lambda model: model.rms)
     error = independent_error(best, float(setting.problem.noise_sigma), setting.noise_given)
     host, event, model = max(fits, key=lambda one: one[2].log_evidence(error**2))
-    ahead = model.log_evidence(error**2) - present.log_evidence(error**2)
+    ahead = model.log_evidence(error**2) - here.log_evidence(error**2)
     if ahead < LEAST_ODDS or model.rms > most_left * float(setting.problem.noise_sigma):
         return None
     run = next(one for one in runs if one.name == event.run)
@@ -119,7 +118,7 @@ def record_error(
         event.value,
         model.standard_errors(error**2)[event.name],
         ahead,
-        tuple(effect for effect in final.effects if effect not in host.effects),
+        tuple(effect for effect in present.effects if effect not in host.effects),
         float(run.time[-1] - run.time[0]),
     )
     return FoundRecordError(found, host.effects)

@@ -22,6 +22,7 @@ from smajax.attribution.joint_search import (
     search_jointly,
 )
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model
+from smajax.attribution.leave_one_run_out import left_of_the_others
 from smajax.attribution.model_fits import Evidence, Model, Search
 from smajax.attribution.optimum import as_model, final_model, refined, with_no_effect_too_many
 from smajax.attribution.same_as_parameters import said_by_parameters
@@ -34,6 +35,8 @@ from smajax.model.effects.library import LIBRARY
 from smajax.model.effects.prior_width import CoefficientPrior
 
 LIKELIEST = 4  # sets of effects from which the search goes on with the values of presets free
+LEFT_WITHOUT_A_RUN = 0.3  # of the error on the other runs: of these a wrong record of one run explains most
+NEAR_NOISE = 1.5  # noises
 FREED_SHARE = 2.0 / 3.0  # of the base error, to which free values of presets lower it where the search begins so
 
 
@@ -131,7 +134,8 @@ class _Stage:
     def has_wrong_record(self, search: JointSearch, found: FittedModel) -> bool:
         """Whether an input of one run was recorded wrongly, asked once, where `found` has many effects and leaves more than noise.
 
-        They may stand in for it, and each round about them costs more than to ask. It is sought beside the base model, the likeliest model of few effects, and `found`.
+        They may stand in for it, and each round about them costs more than to ask. It is sought beside those of the base model, the likeliest model of few effects, and `found`
+        that leave much less of the other runs when one run is left out.
         """
         if self.setting.wrong_record is None or self.records_asked or self._leaves_noise(found):
             return False
@@ -139,8 +143,16 @@ class _Stage:
         few = [one for one in search.fitted.values() if 0 < len(one.effects) < MANY]
         variance = min(map(search.error, few), default=1.0) ** 2
         likeliest = sorted(few, key=lambda one: -one.log_evidence(variance))[:1]
-        search.wrong_record = self.setting.wrong_record([search.fitted[()], *likeliest, found])
+        hosts = [one for one in (search.fitted[()], *likeliest, found) if self._better_without_a_run(search, one)]
+        search.wrong_record = self.setting.wrong_record(hosts, found) if hosts else None
         return search.wrong_record is not None
+
+    def _better_without_a_run(self, search: JointSearch, model: FittedModel) -> bool:
+        """Whether without one run next to noise is left of the others, or little of what is."""
+        carried = set(model.effects)
+        program = next((one for one in search.programs if carried <= set(one)), model.effects)
+        before, after = left_of_the_others(search.joint, model, search.error(model), program)
+        return bool((after < np.maximum(LEFT_WITHOUT_A_RUN * before, NEAR_NOISE * search.noise)).any())
 
     def before_the_end(self, search: JointSearch, found: FittedModel) -> FittedModel | None:
         """One effect that is likelier than those of `found`, in an equation where an unknown function is likelier than these too."""

@@ -68,6 +68,29 @@ def left_out(joint: JointParameters, model: FittedModel, error: float, program: 
     return LeftOut(np.stack([found[part, series] for series, part in enumerate(owner)]), every)
 
 
+def left_of_the_others(
+    joint: JointParameters, model: FittedModel, error: float, program: Sequence[str]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Root mean squares (runs,) of what `model` leaves of the other runs, and of what it would leave fitted to them alone, by one Gauss-Newton step; SI.
+
+    `error` and `program` as of `left_out`.
+    """
+    problem, index = joint.restricted(program)
+    problem = problem.with_noise(error)
+    gram, gradient, misfit = _normal_equations(problem, model, model.values[index])
+    squares, samples = problem.by_run(misfit**2), problem.by_run(np.asarray(problem.batch.mask))
+    before, after = [], []
+    for run in range(problem.batch.runs):
+        other = problem.owner != run
+        count = samples.sum() - samples[run].sum()
+        left = squares.sum() - squares[run].sum()
+        others, slope = gram[other].sum(axis=0), gradient[other].sum(axis=0)
+        step = np.linalg.solve(others + np.diag(model.precision), slope)
+        before.append(left / count)
+        after.append(max(left - 2.0 * float(step @ slope) + float(step @ others @ step), 0.0) / count)
+    return error * np.sqrt(before), error * np.sqrt(after)
+
+
 def predicting(
     joint: JointParameters, fitted: FittedModel, error: float, noise: float, program: Sequence[str] | None = None
 ) -> Model:
@@ -88,11 +111,8 @@ def _steps(
     joint: JointParameters, problem: Problem, model: FittedModel, values: np.ndarray, owner: np.ndarray
 ) -> list[np.ndarray]:
     """The parameters (P,) without each part of the runs, within their bounds. `owner`: the part of each series."""
-    at = sensitivity(problem, values, model.names)
+    gram, gradient, _ = _normal_equations(problem, model, values)
     precision = np.diag(model.precision)
-    columns = -at.jacobian * model.scales
-    gram = np.einsum("snp,snq->spq", columns, columns)
-    gradient = np.einsum("snp,sn->sp", columns, at.misfit)
     slots = [problem.names.index(name) for name in model.names]
     low, high = np.asarray([joint.bounds[name] for name in model.names]).T
     # A run's own value stays: without the run nothing says what it is.
@@ -105,6 +125,15 @@ def _steps(
         point[slots] = np.clip(point[slots] + np.where(own == part, 0.0, step), low, high)
         points.append(point)
     return points
+
+
+def _normal_equations(
+    problem: Problem, model: FittedModel, values: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(J^T J, J^T r, r) of each series at `values` (P,) by the free parameters of `model`, in widths of their priors; in errors of `problem`."""
+    at = sensitivity(problem, values, model.names)
+    columns = -at.jacobian * model.scales
+    return np.einsum("snp,snq->spq", columns, columns), np.einsum("snp,sn->sp", columns, at.misfit), at.misfit
 
 
 def _own(problem: Problem, names: Sequence[str], owner: np.ndarray) -> np.ndarray:

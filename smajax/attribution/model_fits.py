@@ -93,8 +93,8 @@ class Search:
     of_unknowns: Mapping[str, CoefficientPrior] = field(default_factory=dict)  # the same of unknowns that have one
     # Gets a joint search and its likeliest model (`FittedModel`) after each of its rounds.
     after_round: Callable[[Any, Any], object] | None = None
-    # An input of one run that was recorded wrongly, of some models the last of which the search has come to; None: it is not asked for.
-    wrong_record: Callable[[Sequence[Any]], FoundRecordError | None] | None = None
+    # An input of one run that was recorded wrongly, beside some models, in the place of one that the search has come to; None: it is not asked for.
+    wrong_record: Callable[[Sequence[Any], Any], FoundRecordError | None] | None = None
 
     def note(self, done: Round) -> None:
         """Record a round and report it."""

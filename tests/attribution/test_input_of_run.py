@@ -78,7 +78,7 @@ def test_a_wrong_record_is_named_with_its_run_and_size(
     truth: dict[str, float], wrong: Callable[[jax.Array], jax.Array], run: int, coefficient: str, value: float
 ) -> None:
     setting, base, extended, runs = _searched(truth, wrong, run)
-    asked = record_error(setting, (base, extended), runs)
+    asked = record_error(setting, (base, extended), extended, runs)
     assert asked is not None
     found = asked.error
     assert (found.run, found.channel, found.coefficient) == (NAMES[run], "voltage", coefficient)
@@ -90,18 +90,18 @@ def test_a_wrong_record_is_named_with_its_run_and_size(
 
 def test_where_every_record_is_right_none_is_named() -> None:
     setting, base, extended, runs = _searched({"latent_heat.enthalpy": 1.2e4}, _early, None)
-    assert record_error(setting, (base, extended), runs) is None
-    assert record_error(setting, (base,), runs[:2]) is None  # of two that disagree either may be wrong
+    assert record_error(setting, (base, extended), extended, runs) is None
+    assert record_error(setting, (base,), base, runs[:2]) is None  # of two that disagree either may be wrong
 
 
 @pytest.mark.slow
 def test_no_record_is_wrong_where_more_is_missing() -> None:
     """A sensor whose zero drifts in all runs, which nothing that is looked at explains: the error of the record would take its part of it."""
     setting, base, extended, runs = _searched({}, _early, 0)
-    assert record_error(setting, (base, extended), runs) is not None
+    assert record_error(setting, (base, extended), extended, runs) is not None
     drift = 20.0 * float(setting.problem.noise_sigma) * np.sin(np.linspace(0.0, 9.0, SAMPLES))
     problem = setting.problem.with_output(jnp.asarray(setting.problem.measured + drift))
-    assert record_error(dataclasses.replace(setting, problem=problem), (base, extended), runs) is None
+    assert record_error(dataclasses.replace(setting, problem=problem), (base, extended), extended, runs) is None
 
 
 def test_before_a_search_has_ended_the_model_with_the_error_has_to_leave_only_noise() -> None:
@@ -109,9 +109,9 @@ def test_before_a_search_has_ended_the_model_with_the_error_has_to_leave_only_no
     ripple = 1.1 * float(setting.problem.noise_sigma) * np.sin(np.linspace(0.0, 9.0, SAMPLES))
     problem = setting.problem.with_output(jnp.asarray(setting.problem.measured + ripple))
     more = dataclasses.replace(setting, problem=problem)
-    assert record_error(more, (base, extended), runs) is not None
-    assert record_error(more, (base, extended), runs, ONLY_NOISE) is None
-    assert record_error(setting, (base, extended), runs, ONLY_NOISE) is not None
+    assert record_error(more, (base, extended), extended, runs) is not None
+    assert record_error(more, (base, extended), extended, runs, ONLY_NOISE) is None
+    assert record_error(setting, (base, extended), extended, runs, ONLY_NOISE) is not None
 
 
 def _demo(which: str) -> Experiment:
