@@ -32,7 +32,7 @@ INDISTINGUISHABLE = 3.0  # in log odds: twenty to one
 APPROXIMATE = 0.01
 PASSES = 2  # the error of a sample is first that of the model without a term, then that of the best with one
 LARGEST = 2.0  # size of a wave: each is then at most as large as the largest function that is sought
-MUCH = 7e4  # samples times directions of the derivative, of one fit
+MUCH = 1e4  # samples times directions of the derivative, of one fit
 REACH = 10.0  # in log odds behind the likeliest, within which a term is fitted again with the smaller error
 
 
@@ -198,8 +198,8 @@ def programs_of_terms(
 ) -> list[tuple[tuple[str, ...], list[str]]]:
     """(effects and terms that a program carries, terms that are fitted in it).
 
-    The program of all terms is there, from the screening. A run of it computes all of them; where there is much to compute, one
-    for each term is soon worth its three seconds.
+    The program of all terms is there, from the screening. A run of it computes all of them, and takes six times as long as one of a
+    single term; where there is something to compute, one for each term is soon worth its two seconds.
     """
     directions = max(len(joint.free((*effects, term))) for term in terms)
     if directions * float(np.asarray(joint.problem.batch.mask).sum()) < MUCH:
