@@ -30,7 +30,7 @@ from smajax.attribution.findings import (
 )
 from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.held_out import Compared, compare, every_run, validated
-from smajax.attribution.input_of_run import ONLY_NOISE, as_fitted, corrected, record_error
+from smajax.attribution.input_of_run import FAR_LESS, as_fitted, corrected, record_error
 from smajax.attribution.job import effects_excluded, job_of
 from smajax.attribution.joint_stage import (
     base_alone,
@@ -172,7 +172,7 @@ def prepared(  # the stage's inputs, each once
     context = Context(job, setting, start, base, seed, checks, interim, record_errors)
     setting.after_round = None if interim is None else _now_and_then(context, interim)
     if len(record_errors) < MOST_RECORD_ERRORS:
-        setting.wrong_record = partial(record_error, setting, runs=job.fit_runs, most_left=ONLY_NOISE)
+        setting.wrong_record = partial(record_error, setting, runs=job.fit_runs, times_less=FAR_LESS)
     return context
 
 

@@ -45,7 +45,7 @@ MOST_RUNS = 2  # looked at, those of the largest residual first: each costs a fi
 LEAST_ODDS = 3.0  # in log odds: twenty to one that the record is wrong, before a run is corrected by it
 CLOSER = 3.0  # by which a fit is expected to come nearer: what its error is counted in while it runs
 MOST_LEFT = 2.0  # noises that the model with the error leaves: of one that leaves more no record is said to be wrong
-ONLY_NOISE = 1.2  # the same before a search has ended: what is missing may be what it has not come to yet
+FAR_LESS = 4.0  # times that what the present model leaves before a search has ended: what is missing may be what it has not come to yet
 MOST_SHARES = (
     (4, 0.6),
     (8, 0.3),
@@ -91,15 +91,15 @@ class _EventParameters(JointParameters):
 
 
 def record_error(
-    setting: Search, hosts: Sequence[Host], present: Host, runs: Sequence[Run], most_left: float = MOST_LEFT
+    setting: Search, hosts: Sequence[Host], present: Host, runs: Sequence[Run], times_less: float = 1.0
 ) -> FoundRecordError | None:
     """The likeliest error of the record of one fit run, where it is likelier than `present` by `LEAST_ODDS`; `runs` of the fit, in order.
 
-    It is sought beside each of `hosts`, in the place of all effects that `present` has beside theirs. `most_left`: noises that the model with it may leave.
+    It is sought beside each of `hosts`, in the place of all effects that `present` has beside theirs. `times_less`: by which the model with it leaves less at least.
     """
     if len(runs) < LEAST_RUNS:
         return None
-    fits = [(host, *one) for host in hosts for one in _fits(setting, host, [run.name for run in runs], most_left)]
+    fits = [(host, *one) for host in hosts for one in _fits(setting, host, [run.name for run in runs])]
     if not fits:
         return None
     joint = setting.joint(setting.candidates)
@@ -108,7 +108,8 @@ def record_error(
     error = independent_error(best, float(setting.problem.noise_sigma), setting.noise_given)
     host, event, model = max(fits, key=lambda one: one[2].log_evidence(error**2))
     ahead = model.log_evidence(error**2) - here.log_evidence(error**2)
-    if ahead < LEAST_ODDS or model.rms > most_left * float(setting.problem.noise_sigma):
+    most_left = min(MOST_LEFT * float(setting.problem.noise_sigma), here.rms / times_less)
+    if ahead < LEAST_ODDS or model.rms > most_left:
         return None
     run = next(one for one in runs if one.name == event.run)
     found = RecordError(
@@ -134,7 +135,7 @@ class _Event(NamedTuple):
         return f"{self.coefficient}[{self.run}]"
 
 
-def _fits(setting: Search, host: Host, runs: Sequence[str], most_left: float) -> list[tuple[_Event, FittedModel]]:
+def _fits(setting: Search, host: Host, runs: Sequence[str]) -> list[tuple[_Event, FittedModel]]:
     """`host` with each kind of error in each of the runs that it leaves most of, fitted."""
     own, slots = setting.restricted(host.effects)
     system = own.system_at(jnp.asarray(host.values[slots]))
@@ -166,7 +167,7 @@ def _fits(setting: Search, host: Host, runs: Sequence[str], most_left: float) ->
     settings = comparison_settings(settings, "inputs of single runs")
     # Of a wrong record there is noise left when it is right; what comes nowhere near that in a few steps is none.
     squares = float((left**2).sum()) / error**2
-    allowed = (most_left * float(own.noise_sigma) / error) ** 2 * float(np.asarray(own.batch.mask).sum())
+    allowed = (MOST_LEFT * float(own.noise_sigma) / error) ** 2 * float(np.asarray(own.batch.mask).sum())
     excess = tuple((steps, max(share * squares, allowed)) for steps, share in MOST_SHARES)
     settings = replace(settings, allowed_excess=excess, least_cost=0.0, promised_excess=None, one_of_each=0)
     fits = levenberg_marquardt(joint_problem, tasks, settings)
