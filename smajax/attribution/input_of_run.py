@@ -91,11 +91,11 @@ class _EventParameters(JointParameters):
 
 
 def record_error(
-    setting: Search, hosts: Sequence[Host], present: Host, runs: Sequence[Run], times_less: float = 1.0
+    setting: Search, hosts: Sequence[Host], present: Host, runs: Sequence[Run], times_less: float | None = None
 ) -> FoundRecordError | None:
     """The likeliest error of the record of one fit run, where it is likelier than `present` by `LEAST_ODDS`; `runs` of the fit, in order.
 
-    It is sought beside each of `hosts`, in the place of all effects that `present` has beside theirs. `times_less`: by which the model with it leaves less at least.
+    It is sought beside each of `hosts`, in the place of all effects that `present` has beside theirs. `times_less`: by which the model with it leaves less at least; None: it may leave as much.
     """
     if len(runs) < LEAST_RUNS:
         return None
@@ -108,8 +108,9 @@ def record_error(
     error = independent_error(best, float(setting.problem.noise_sigma), setting.noise_given)
     host, event, model = max(fits, key=lambda one: one[2].log_evidence(error**2))
     ahead = model.log_evidence(error**2) - here.log_evidence(error**2)
-    most_left = min(MOST_LEFT * float(setting.problem.noise_sigma), here.rms / times_less)
-    if ahead < LEAST_ODDS or model.rms > most_left:
+    too_much = model.rms > MOST_LEFT * float(setting.problem.noise_sigma)
+    too_near = times_less is not None and model.rms > here.rms / times_less
+    if ahead < LEAST_ODDS or too_much or too_near:
         return None
     run = next(one for one in runs if one.name == event.run)
     found = RecordError(

@@ -187,11 +187,11 @@ def _promising(search: JointSearch, linear: LinearModel, present: FittedModel, e
         if effects != present.effects and _fresh(search, effects, error):
             sets.setdefault(effects, subset)
     if not present.effects:
-        single = sorted(
-            {frozenset({one}) for subset in sets.values() for one in subset}, key=lambda one: -linear.log_evidence(one)
-        )
-        for subset in [one for one in single if _fresh(search, _effects(search, one), error)][:ALONE]:
-            sets.setdefault(_effects(search, subset), subset)
+        single = {frozenset({one}) for subset in sets.values() for one in subset}
+        alone: dict[tuple[str, ...], Subset] = {}
+        for subset in sorted(single, key=lambda one: -linear.log_evidence(one)):
+            alone.setdefault(_effects(search, subset), subset)
+        sets |= dict([(one, subset) for one, subset in alone.items() if _fresh(search, one, error)][:ALONE])
     return list(sets.values())
 
 

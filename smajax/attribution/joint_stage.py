@@ -14,6 +14,7 @@ import numpy as np
 from smajax.attribution.exclusive_effects import replaceable
 from smajax.attribution.findings import LikelierModel, NoLikelierModel, Reason, Round, StepDependent
 from smajax.attribution.fitted_sets import JointRound, JointSearch
+from smajax.attribution.input_of_run import FAR_LESS
 from smajax.attribution.joint_search import (
     MANY,
     fitted_alone,
@@ -88,10 +89,9 @@ class _Stage:
             return search, found
         # And without what looks much the same, which has been tried in their place.
         alike = {name for name in search.joint.coefficients for one in doubted if replaceable(name, one)}
-        rest = _Stage(self.setting, self.settings, self.excluded | alike | set(doubted), self.asked, self.records_asked)
+        # No record is asked for without them: it would be held against less likely models than were found.
+        rest = _Stage(self.setting, self.settings, self.excluded | alike | set(doubted), self.asked, [()])
         other, instead = rest._from_base(base, search.programs)
-        if other.wrong_record:
-            return other, instead
         search.fitted = {**other.fitted, **search.fitted}
         error = search.error(search.best(search.error(found)))
         if instead.log_evidence(error**2) <= found.log_evidence(error**2):
@@ -132,12 +132,12 @@ class _Stage:
         return self._one_effect(search, found, [named]) or found
 
     def has_wrong_record(self, search: JointSearch, found: FittedModel) -> bool:
-        """Whether an input of one run was recorded wrongly, asked once, where `found` has many effects and leaves more than noise.
+        """Whether an input of one run was recorded wrongly, asked once, where `found` has many effects and leaves many noises.
 
         They may stand in for it, and each round about them costs more than to ask. It is sought beside those of the base model, the likeliest model of few effects, and `found`
         that leave much less of the other runs when one run is left out.
         """
-        if self.setting.wrong_record is None or self.records_asked or self._leaves_noise(found):
+        if self.setting.wrong_record is None or self.records_asked or found.rms < FAR_LESS * search.noise:
             return False
         self.records_asked.append(found.effects)
         few = [one for one in search.fitted.values() if 0 < len(one.effects) < MANY]
@@ -149,8 +149,10 @@ class _Stage:
 
     def _better_without_a_run(self, search: JointSearch, model: FittedModel) -> bool:
         """Whether without one run next to noise is left of the others, or little of what is."""
-        carried = set(model.effects)
-        program = next((one for one in search.programs if carried <= set(one)), model.effects)
+        # Of those that are compiled the smallest; what an earlier search carried may be in the base model since.
+        programs = [search.joint.ordered(one) for one in search.programs]
+        fitting = [one for one in programs if set(model.effects) <= set(one)]
+        program = min(fitting, key=len, default=model.effects)
         before, after = left_of_the_others(search.joint, model, search.error(model), program)
         return bool((after < np.maximum(LEFT_WITHOUT_A_RUN * before, NEAR_NOISE * search.noise)).any())
 

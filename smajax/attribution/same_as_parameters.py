@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection
 
 from smajax.attribution.joint_parameters import JointParameters
@@ -26,6 +27,7 @@ def _said(joint: JointParameters, parameters: Collection[str], effect: str) -> b
 
 def _relative_width(joint: JointParameters, name: str) -> float:
     prior = joint.priors.get(name)
-    if prior is None:
-        return float("inf")  # within its bounds nothing is known of it
+    if prior is None:  # anywhere within its bounds
+        low, high = joint.bounds[name]
+        return (high - low) / math.sqrt(12.0) / abs(0.5 * (low + high))
     return prior.sigma if prior.logarithmic else prior.sigma / abs(prior.base)

@@ -14,6 +14,8 @@ import pytest
 from smajax.attribution.close_loop import close_loop
 from smajax.attribution.findings import Findings
 from smajax.attribution.input_of_run import FAR_LESS, corrected, record_error
+from smajax.attribution.laplace_evidence import fitted_model
+from smajax.attribution.leave_one_run_out import left_of_the_others
 from smajax.attribution.model_fits import Model, Search, Start
 from smajax.attribution.record_error import RecordError
 from smajax.core.result_cache import ResultCache
@@ -108,6 +110,17 @@ def test_before_a_search_has_ended_the_model_with_the_error_has_to_leave_far_les
     setting, base, extended, runs = _searched({}, _early, 0)
     assert record_error(setting, (base, extended), extended, runs, FAR_LESS) is not None
     assert record_error(setting, (base, extended), extended, runs, 1e3) is None
+
+
+def test_without_a_run_whose_record_is_wrong_little_is_left_of_the_others() -> None:
+    setting, base, _, runs = _searched({}, _early, 0)
+    joint = setting.joint(setting.candidates)
+    noise = float(setting.problem.noise_sigma)
+    model = fitted_model(joint, (), base.values, ())
+    before, after = left_of_the_others(joint, model, noise, ())
+    assert before.shape == after.shape == (len(runs),)
+    assert after[0] < 0.3 * before[0]
+    assert (after[1:] > 0.5 * before[1:]).all()
 
 
 def _demo(which: str) -> Experiment:

@@ -93,7 +93,11 @@ def test_an_effect_that_gains_nothing_at_half_the_step_is_excluded(monkeypatch: 
 def _model(effects: Sequence[str], left: float, evidence: float) -> Any:
     """Of a made-up fit that leaves a residual of `left`, with that log evidence at any error of a sample."""
     return SimpleNamespace(
-        effects=tuple(effects), residual=np.full(4, left), values=np.zeros(3), log_evidence=lambda _: evidence
+        effects=tuple(effects),
+        residual=np.full(4, left),
+        rms=left,
+        values=np.zeros(3),
+        log_evidence=lambda _: evidence,
     )
 
 
@@ -136,6 +140,7 @@ def _stage_and_search(
         error=lambda model: float(model.residual[0]),
         lacking=None,
         wrong_record=None,
+        noise=1.0,
         joint=SimpleNamespace(coefficients=("latent_heat", "sensor_drift", "sensor_gain")),
         excluded=frozenset({"sensor_gain"}),
     )
@@ -213,7 +218,7 @@ def test_the_second_search_is_without_what_looks_like_what_the_first_has_found(m
     assert excluded == [set(), {"coulomb_friction", "pulley_friction", "sensor_backlash"}]
 
 
-def test_a_wrong_record_is_asked_for_once_where_many_effects_leave_more_than_noise(
+def test_a_wrong_record_is_asked_for_once_where_many_effects_leave_many_noises(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Beside those that one run keeps from the others; the search ends where it is found."""
@@ -229,7 +234,7 @@ def test_a_wrong_record_is_asked_for_once_where_many_effects_leave_more_than_noi
 
     stage.setting.wrong_record = wrong_record
     search.fitted |= {effects: _model(effects, 5.0, odds) for effects, odds in ((THREE[:1], 3.0), (THREE[1:], 1.0))}
-    assert not stage.has_wrong_record(search, cast(Any, _model(THREE, 1.0, 9.0)))  # nothing is missing
+    assert not stage.has_wrong_record(search, cast(Any, _model(THREE, 3.0, 9.0)))  # little is missing
     assert stage.has_wrong_record(search, cast(Any, _model(THREE, 5.0, 9.0)))
     assert search.wrong_record is FOUND
     assert not stage.has_wrong_record(search, cast(Any, _model(THREE, 5.0, 9.0)))
@@ -294,7 +299,7 @@ def test_without_what_held_out_runs_reject_nothing_is_asked_for_again(monkeypatc
     assert stage.excluded == {"creep", "latent_heat"}
     assert stage.asked == [known]
     setting.wrong_record = lambda *_: pytest.fail("a record was asked for")
-    assert not stage.has_wrong_record(cast(Any, SimpleNamespace()), cast(Any, _model(THREE, 5.0, 9.0)))
+    assert not stage.has_wrong_record(cast(Any, SimpleNamespace(noise=1.0)), cast(Any, _model(THREE, 5.0, 9.0)))
 
 
 def test_effects_stand_by_how_much_the_model_needs_them_even_where_it_was_never_fitted_without() -> None:

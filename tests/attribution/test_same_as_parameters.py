@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 
 import pytest
@@ -47,6 +48,13 @@ def test_parameters_that_are_free_say_all_that_these_effects_do(
     unknowns: tuple[str, ...], presets: dict[str, float], said: set[str]
 ) -> None:
     assert said_by_parameters(_joint((*UNKNOWNS, *unknowns), presets)) == said
+
+
+def test_an_unknown_within_narrow_bounds_says_less_than_the_effect() -> None:
+    joint = _joint((*UNKNOWNS, *SLOPES), {})
+    values = parameter_values(joint.problem.system)
+    narrow = {name: (0.98 * float(values[name]), 1.02 * float(values[name])) for name in SLOPES}
+    assert said_by_parameters(dataclasses.replace(joint, bounds={**joint.bounds, **narrow})) == frozenset()
 
 
 def test_what_says_the_same_names_parameters_of_a_wire() -> None:
