@@ -40,7 +40,7 @@ class JointSearch:
     in_place_of_many: Callable[[FittedModel], FittedModel | None] = lambda _: None
     # What it goes on from where it would end with a model; None: it ends.
     before_the_end: Callable[[FittedModel], FittedModel | None] = lambda _: None
-    # Whether the record of one run is wrong where a model of many effects leaves more than noise: the search ends, and is made again with it corrected.
+    # Whether the record of one run is wrong where a model of many effects leaves many noises: the search ends, and is made again with it corrected.
     has_wrong_record: Callable[[FittedModel], bool] = lambda _: False
     wrong_record: FoundRecordError | None = None
     lacking: AskedFor | None = None  # unknown terms beside the base model, where they were asked for

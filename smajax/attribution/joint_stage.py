@@ -47,9 +47,7 @@ class _Stage:
     settings: FitSettings
     excluded: set[str] = field(default_factory=set)
     asked: list[AskedFor] = field(default_factory=list)  # unknown terms beside the base model, once they were asked for
-    records_asked: list[tuple[str, ...]] = field(
-        default_factory=list
-    )  # effects beside which records of single runs were
+    asks_for_records: bool = True  # whether the record of a run may be found wrong, until it was asked for
 
     def joint_search(self, presets: Mapping[str, CoefficientPrior]) -> JointSearch:
         """Among the candidates that were not excluded."""
@@ -90,7 +88,7 @@ class _Stage:
         # And without what looks much the same, which has been tried in their place.
         alike = {name for name in search.joint.coefficients for one in doubted if replaceable(name, one)}
         # No record is asked for without them: it would be held against less likely models than were found.
-        rest = _Stage(self.setting, self.settings, self.excluded | alike | set(doubted), self.asked, [()])
+        rest = _Stage(self.setting, self.settings, self.excluded | alike | set(doubted), self.asked, False)
         other, instead = rest._from_base(base, search.programs)
         search.fitted = {**other.fitted, **search.fitted}
         error = search.error(search.best(search.error(found)))
@@ -137,9 +135,9 @@ class _Stage:
         They may stand in for it, and each round about them costs more than to ask. It is sought beside those of the base model, the likeliest model of few effects, and `found`
         that leave much less of the other runs when one run is left out.
         """
-        if self.setting.wrong_record is None or self.records_asked or found.rms < FAR_LESS * search.noise:
+        if self.setting.wrong_record is None or not self.asks_for_records or found.rms < FAR_LESS * search.noise:
             return False
-        self.records_asked.append(found.effects)
+        self.asks_for_records = False
         few = [one for one in search.fitted.values() if 0 < len(one.effects) < MANY]
         variance = min(map(search.error, few), default=1.0) ** 2
         likeliest = sorted(few, key=lambda one: -one.log_evidence(variance))[:1]
@@ -293,7 +291,7 @@ def search_without(setting: Search, search: JointSearch, effects: Sequence[str])
     stage = _Stage(setting, _settings(setting), {*search.excluded, *effects})
     if search.lacking is not None:
         stage.asked.append(search.lacking)  # of the same base model
-    stage.records_asked.append(())  # records of fit runs are no longer corrected once held-out runs have been looked at
+    stage.asks_for_records = False  # no longer, once held-out runs have been looked at
     return _kept_at_half_step(stage, lambda: stage.resumed(search))
 
 
