@@ -44,7 +44,10 @@ class RunBatch(eqx.Module):
     @property
     def measured(self) -> np.ndarray:
         """Where a run has a sample of any output, (runs, N)."""
-        return (np.asarray(self.mask) > 0).reshape(self.runs, len(self.outputs), -1).any(axis=1)
+        present = (np.asarray(self.mask) > 0).reshape(self.runs, len(self.outputs), -1)
+        return np.asarray(
+            present.any(axis=1)
+        )  # an array by every NumPy's types: those for Python 3.11 also allow a single truth value
 
 
 def pack(runs: Sequence[Run], dt: float, defaults: dict[str, float], integration: Integration = ONE_STEP) -> RunBatch:
