@@ -1,7 +1,7 @@
 """An input that was recorded wrongly in one run: late, on another clock, at another level, or with another load than noted.
 
 Each is an effect of the library with a value of that run alone, and an event with the prior odds of one, shared among the runs. It
-is fitted together with all parameters of the base model and of the likeliest model, in the runs that these leave most of, and
+is fitted together with all parameters of the base model and of the likeliest model, in the runs without which least is left of the others, and
 compared by its evidence as sets of effects are. Asked only where something is missing. Where one is likelier, and explains what was
 missing, `close-loop` goes on with the run corrected by it (`corrected`): what the search named in its place was a stand-in. How large it is stays
 an unknown of that run: the first value was found beside stand-ins, and held there it made others needed.
@@ -24,6 +24,7 @@ import numpy as np
 from smajax.attribution.findings import ParameterFinding
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model, independent_error
+from smajax.attribution.leave_one_run_out import left_of_the_others
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.program_fits import comparison_settings
 from smajax.attribution.record_error import FoundRecordError, RecordError
@@ -41,7 +42,7 @@ from smajax.model.effects.prior_width import CoefficientPrior
 from smajax.model.extended import with_effects
 from smajax.model.system import System, recorded_apart
 
-MOST_RUNS = 2  # looked at, those of the largest residual first: each costs a fit for every kind of error
+MOST_RUNS = 2  # looked at, those without which least is left of the others: each costs a fit for every kind of error
 LEAST_ODDS = 3.0  # in log odds: twenty to one that the record is wrong, before a run is corrected by it
 CLOSER = 3.0  # by which a fit is expected to come nearer: what its error is counted in while it runs
 MOST_LEFT = 2.0  # noises that the model with the error leaves: of one that leaves more no record is said to be wrong
@@ -137,7 +138,7 @@ class _Event(NamedTuple):
 
 
 def _fits(setting: Search, host: Host, runs: Sequence[str]) -> list[tuple[_Event, FittedModel]]:
-    """`host` with each kind of error in each of the runs that it leaves most of, fitted."""
+    """`host` with each kind of error in each of the runs without which it leaves least of the others, fitted."""
     own, slots = setting.restricted(host.effects)
     system = own.system_at(jnp.asarray(host.values[slots]))
     kinds = [kind for kind in KINDS if _possible(kind, system)]
@@ -150,8 +151,8 @@ def _fits(setting: Search, host: Host, runs: Sequence[str]) -> list[tuple[_Event
     per_run = PerRun(names, tuple(runs), start, own.per_run.single)
     problem = own.with_system(whole, per_run=per_run)
     (left,) = misfits(own, [host.values[slots]])
-    worst = np.argsort(-(own.by_run(left) ** 2).sum(axis=1), kind="stable")[:MOST_RUNS]
-    events = {of_run(kind.coefficient, runs[run]): (kind, runs[run]) for run in worst for kind in kinds}
+    doubtful = _least_left_without(setting, host)[:MOST_RUNS]
+    events = {of_run(kind.coefficient, runs[run]): (kind, runs[run]) for run in doubtful for kind in kinds}
     joint = _with_events(setting, host, problem, events)
     groups = []
     for name, (kind, _) in events.items():
@@ -179,6 +180,17 @@ def _fits(setting: Search, host: Host, runs: Sequence[str]) -> list[tuple[_Event
         )
         for (name, (kind, run)), fit in zip(events.items(), fits, strict=True)
     ]
+
+
+def _least_left_without(setting: Search, host: Host) -> np.ndarray:
+    """The fit runs (runs,) by how little `host` leaves of the others without them, the least first.
+
+    A fit to all runs shares the error of one record out: the run that it leaves most of is often another one.
+    """
+    joint = setting.joint(setting.candidates)
+    model = fitted_model(joint, host.effects, host.values, host.effects)
+    _, after = left_of_the_others(joint, model, max(float(setting.problem.noise_sigma), model.rms), host.effects)
+    return np.argsort(after, kind="stable")
 
 
 def _possible(kind: Kind, system: System) -> bool:

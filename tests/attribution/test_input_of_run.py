@@ -65,6 +65,7 @@ def _early(volts: jax.Array) -> jax.Array:
     ("truth", "wrong", "run", "coefficient", "value"),
     [
         ({}, _early, 0, "input_delay.delay", 0.6),
+        ({}, lambda volts: volts / 1.05, 3, "input_level.gain", 0.05),  # the fit leaves more of every other run
         pytest.param(
             {"latent_heat.enthalpy": 1.2e4},
             lambda volts: volts / 0.9,
@@ -74,7 +75,7 @@ def _early(volts: jax.Array) -> jax.Array:
             marks=pytest.mark.slow,
         ),
     ],
-    ids=["recorded early", "noted too high beside a latent heat"],
+    ids=["recorded early", "noted too low", "noted too high beside a latent heat"],
 )
 def test_a_wrong_record_is_named_with_its_run_and_size(
     truth: dict[str, float], wrong: Callable[[jax.Array], jax.Array], run: int, coefficient: str, value: float
