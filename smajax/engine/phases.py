@@ -8,84 +8,16 @@ thread's own memory, in the nearest cache.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from heapq import heappop, heappush
 
 import numpy as np
 
+from smajax.engine.parts import LINE, Chosen, Edge, Item, Late, Names, Phase, Uniform, Work, Write
+from smajax.engine.phase_functions import phase_function
+
 LEAST, MOST = 24, 60  # works a phase
-LINE = 64  # bytes
-NAMES = re.compile(r"%[a-z]+\d+")
-OWN = re.compile(r"%[a-z]+\d+|%at\b|%turn\b")
-LABELS = re.compile(r", %(\w+) \]")
-
-
-@dataclass(slots=True)
-class Work:
-    """Instructions on one vector that stay together: `%turn` is its number within the group, `%at` that of its first run."""
-
-    name: str | None  # of what comes out
-    lines: list[str]
-    reads: tuple[str, ...]  # names of what goes in and differs from vector to vector
-
-
-@dataclass(slots=True)
-class Write:
-    """Cells and what they are to hold, all at once: a value may be what another of them held."""
-
-    pairs: list[tuple[str, str]]
-
-
-@dataclass(frozen=True, slots=True)
-class Late:
-    """A line that waits for the works before it."""
-
-    line: str
-
-
-@dataclass(frozen=True, slots=True)
-class Edge:
-    """Of a loop: where it begins, and where it has ended."""
-
-    begins: bool
-
-
-@dataclass(frozen=True, slots=True)
-class Chosen:
-    """Vectors of a group, in memory: how many, and which. Works after it are of these alone, to the end of the loop."""
-
-    count: str
-    numbers: str
-
-
-Item = str | Work | Write | Late | Edge | Chosen
-
-
-@dataclass(frozen=True, slots=True)
-class Layout:
-    """How a vector lies in memory."""
-
-    kind: str  # LLVM's
-    size: int  # bytes
-    mask: str | None = None  # of truth values that are stored as whole numbers: their kind in a register
-
-
-@dataclass(frozen=True, slots=True)
-class Names:
-    """Those of what differs from vector to vector."""
-
-    layouts: dict[str, Layout]
-    cells: dict[str, str]  # name -> the cell whose present value it is
-
-
-@dataclass(slots=True)
-class _Phase:
-    works: list[Work | Write]
-    chosen: Chosen | None
-    loads: list[str] = field(default_factory=list)
-    stores: list[tuple[str, str]] = field(default_factory=list)  # (where, what)
 
 
 @dataclass(slots=True)
@@ -96,7 +28,7 @@ class _Block:
     works: list[Work | Write] = field(default_factory=list)
     late: list[str] = field(default_factory=list)
     end: str = ""
-    phases: list[_Phase] = field(default_factory=list)
+    phases: list[Phase] = field(default_factory=list)
 
 
 @dataclass(slots=True)
@@ -178,7 +110,7 @@ def _blocks(items: Iterable[Item], most: int) -> tuple[list[_Block], list[tuple[
             blocks.append(_Block(item[:-1], chosen))
         elif item.startswith(("  br ", "  ret ")):
             here.end = item
-            here.phases = [_Phase(part, here.chosen) for part in _cut(here.works, most)]
+            here.phases = [Phase(part, here.chosen) for part in _cut(here.works, most)]
             count += len(here.phases)
         else:
             here.lines.append(item)
@@ -217,7 +149,7 @@ def _lay_early(
     left: Sequence[_Left],
     made: Mapping[str, int],
     reads: Mapping[str, list[int]],
-    phases: Sequence[_Phase],
+    phases: Sequence[Phase],
     loops: Sequence[tuple[int, int]],
     cells: Mapping[str, str],
 ) -> None:
@@ -257,7 +189,7 @@ def _places(spans: Mapping[str, tuple[int, int]], sizes: Mapping[str, int], vect
 
 
 def _settled(
-    phases: Sequence[_Phase], loops: Sequence[tuple[int, int]], names: Names
+    phases: Sequence[Phase], loops: Sequence[tuple[int, int]], names: Names
 ) -> tuple[Names, dict[str, tuple[int, int]]]:
     """What each phase loads and stores, put down in it; the names with cells joined, and from when to when each lives."""
     made: dict[str, int] = {}
@@ -313,8 +245,10 @@ def _settled(
     return Names(names.layouts, cells), spans
 
 
-def laid_out(items: Sequence[Item], names: Names, lanes: int, vectors: int, start: int) -> tuple[list[str], int]:
-    """The lines of the function, and the bytes of a thread's own memory that it takes from `start` on.
+def laid_out(
+    items: Sequence[Item], names: Names, uniform: Uniform, lanes: int, vectors: int, start: int
+) -> tuple[list[str], list[str], int]:
+    """The lines of the function, those of its phases' functions, and the bytes of a thread's own memory that it takes from `start` on.
 
     Of a single vector nothing is cut: there is no other to go on with.
     """
@@ -324,77 +258,16 @@ def laid_out(items: Sequence[Item], names: Names, lanes: int, vectors: int, star
     places = {name: start + at for name, at in places.items()}
 
     lines: list[str] = []
-    tails = {}  # of a block, where its last phase has ended
+    functions: list[str] = []
     number = 0
     for block in blocks:
         lines += [f"{block.label}:"] if block.label != "entry" else []
         lines += block.lines
-        tail = block.label
         for phase in block.phases:
             if phase.loads or phase.stores or any(isinstance(one, Work) for one in phase.works):
-                lines += _written(phase, number, tail, names, lanes, places)
-                tail = f"past{number}"
+                call, function = phase_function(phase, number, names, uniform, lanes, places)
+                lines.append(call)
+                functions += function
             number += 1
-        tails[block.label] = tail
         lines += [*block.late, block.end]
-
-    def renamed(line: str) -> str:
-        if " = phi " not in line or ".k = " in line:
-            return line
-        return LABELS.sub(lambda at: f", %{tails.get(at[1], at[1])} ]", line)
-
-    return [renamed(one) for one in lines], total
-
-
-def _written(phase: _Phase, number: int, before: str, names: Names, lanes: int, places: Mapping[str, int]) -> list[str]:
-    """A phase as a loop over the vectors of a group, or over those chosen."""
-    stem, chosen, rows = f"%phase{number}", phase.chosen, dict[int, str]()  # `rows`: this vector's places, by its bytes
-    count, turn, at, many = f"{stem}.k", f"{stem}.turn", f"{stem}.at", f"{stem}.many" if chosen else "%vectors"
-    here = {name: f"{name}.{number}" for name in phase.loads} | {"%at": at, "%turn": turn}
-    lines = [f"  {many} = load i64, ptr {chosen.count}"] if chosen else []
-    lines += [
-        f"  br label {stem}",
-        f"phase{number}:",
-        f"  {count} = phi i64 [ 0, %{before} ], [ {stem}.next, {stem} ]",
-    ]
-    if chosen:
-        lines.append(f"  {stem}.which = getelementptr inbounds i64, ptr {chosen.numbers}, i64 {count}")
-        lines.append(f"  {turn} = load i64, ptr {stem}.which")
-    else:
-        lines.append(f"  {turn} = add i64 {count}, 0")
-    lines.append(f"  {at} = mul i64 {turn}, {lanes}")
-
-    def own(text: str) -> str:
-        return OWN.sub(lambda one: here.get(one[0], one[0]), text)
-
-    def address(name: str, use: str) -> str:
-        size, where = names.layouts[name].size, f"{stem}.{use}.address"
-        if size not in rows:
-            rows[size] = f"{stem}.row{size}"
-            lines.append(f"  {rows[size]} = getelementptr inbounds [{size} x i8], ptr %scratch, i64 {turn}")
-        lines.append(f"  {where} = getelementptr inbounds i8, ptr {rows[size]}, i64 {places[name]}")
-        return f"ptr {where}, align {min(size & -size, LINE)}"
-
-    for k, name in enumerate(phase.loads):
-        cell = names.cells.get(name, name)
-        layout, where = names.layouts[cell], address(cell, f"load{k}")
-        if layout.mask is None:
-            lines.append(f"  {here[name]} = load {layout.kind}, {where}")
-        else:
-            lines.append(f"  {here[name]}.stored = load {layout.kind}, {where}")
-            lines.append(f"  {here[name]} = icmp slt {layout.kind} {here[name]}.stored, zeroinitializer")
-    for work in phase.works:
-        lines += ["  " + own(one) for one in work.lines] if isinstance(work, Work) else []
-    for k, (name, value) in enumerate(phase.stores):
-        layout, where, what = names.layouts[name], address(name, f"store{k}"), own(value)
-        if layout.mask is not None:
-            lines.append(f"  {stem}.store{k} = sext {layout.mask} {what} to {layout.kind}")
-            what = f"{stem}.store{k}"
-        lines.append(f"  store {layout.kind} {what}, {where}")
-    return [
-        *lines,
-        f"  {stem}.next = add i64 {count}, 1",
-        f"  {stem}.more = icmp slt i64 {stem}.next, {many}",
-        f"  br i1 {stem}.more, label {stem}, label %past{number}",
-        f"past{number}:",
-    ]
+    return lines, functions, total

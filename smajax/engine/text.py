@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from smajax.engine.phases import NAMES, Chosen, Edge, Item, Late, Layout, Names, Work, Write
+from smajax.engine.parts import NAMES, Chosen, Edge, Item, Late, Layout, Names, Uniform, Work, Write
 
 NAME = "runs"  # of the translated function
 
@@ -85,6 +85,7 @@ class Text:
         self.estimates = estimates  # 1/x by AVX-512's estimate, not by division
         self.either: dict[str, tuple[str, float, float]] = {}  # (mask, yes, no) of what is one of two constants
         self.names = Names({}, {})
+        self.uniform = Uniform()
         self.levels: list[_Level] = [_Level(sure=True)]
         self.least_depth = 0  # of the innermost loop that may not run: nothing is done before it
         self._layouts: dict[str, Layout] = {}
@@ -126,7 +127,16 @@ class Text:
             level.items.append(Work(name, [f"{name} = {right}"], reads))
         else:
             level.items.append(f"  {name} = {right}")
+            self._note_uniform(name, right, dtype)
         return name
+
+    def _note_uniform(self, name: str, right: str, dtype: str | None) -> None:
+        """What a phase that uses it needs to know: its kind, or how to compute it again. All but vectors are addresses and whole numbers."""
+        is_address = right.startswith("getelementptr ")
+        if is_address:
+            self.uniform.addresses[name] = right
+        scalar = "ptr" if is_address or right.startswith("load ptr,") else "i64"
+        self.uniform.kinds[name] = self.vector(dtype) if dtype is not None else scalar
 
     def layout(self, dtype: str) -> Layout:
         """Of what differs from vector to vector."""
@@ -173,6 +183,7 @@ class Text:
         self.label(label)
         count = self.fresh("i")
         self.depth[count] = len(self.levels) - 1
+        self.uniform.kinds[count] = "i64"
         return count
 
     def close(self, count: str, following: str, before: str, first: str = "0") -> None:

@@ -358,8 +358,8 @@ def translate(
     # The processor takes what it has of 512 bits. Without the alignment what does not fit its registers would lie across
     # cache lines.
     attributes = 'attributes #0 = { nounwind alignstack=64 "prefer-vector-width"="512" "min-legal-vector-width"="512" }'
-    body, room = laid_out(text.levels[0].items, text.names, lanes, vectors, text.scratch)
-    lines = [*text.globals, *sorted(text.declared.values()), head, *body, "}", attributes]
+    body, functions, room = laid_out(text.levels[0].items, text.names, text.uniform, lanes, vectors, text.scratch)
+    lines = [*text.globals, *sorted(text.declared.values()), *functions, head, *body, "}", attributes]
     return Translated("\n".join(lines) + "\n", lanes, results, text.scratch + room)
 
 

@@ -11,6 +11,7 @@ import dataclasses
 import jax.numpy as jnp
 import numpy as np
 
+from smajax.fit.outputs_of_runs import predicted_at
 from smajax.fit.packed_runs import RunBatch, predict_compiled
 from smajax.fit.problem import Problem
 from smajax.model.system import System
@@ -25,6 +26,8 @@ LARGEST = 0.1  # of an output's noise: the error, rms over a run, that integrati
 # without damping some 600 a second. A trial point at which a force grows with speed, so that the load shakes, takes 10,000 a second: half a minute
 # of one fit's ten. It has no numbers then, and no fit goes there.
 TRIES_A_SECOND, TRIES_A_SAMPLE, AT_TOLERANCE = 2000.0, 100.0, 1e-4
+# Of the tries that a model needs, so many a model may need that has one smooth function more; a tenth of what a load needs that shakes.
+NEARBY, LEAST_SHARE = 8, 64
 MARGIN = 0.5  # of that, at the start: by the end of a fit its values have moved
 
 
@@ -88,6 +91,23 @@ def unlimited(integration: Integration) -> Integration:
     if integration.most_tries is None:
         return integration
     return dataclasses.replace(integration, most_tries=jnp.asarray(jnp.inf))
+
+
+def limited_near(problem: Problem, values: np.ndarray) -> Integration:
+    """The problem's integration with `NEARBY` times the tries that its runs need at `values` (P,), where that is less than it has.
+
+    The need is known to a factor of two, and not below `1 / LEAST_SHARE` of what it has.
+    """
+    integration = problem.batch.integration
+    if integration.most_tries is None:
+        return integration
+    share = LEAST_SHARE
+    while share > NEARBY:
+        needed = dataclasses.replace(integration, most_tries=integration.most_tries / share)
+        if np.isfinite(predicted_at(with_integration(problem, needed), [values])).all():
+            return dataclasses.replace(needed, most_tries=NEARBY * needed.most_tries)
+        share //= 2
+    return integration
 
 
 def choose_integration(

@@ -15,6 +15,7 @@ from smajax.fit.integration import (
     choose_integration,
     described,
     integration_error,
+    limited_near,
     with_integration,
 )
 from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
@@ -129,3 +130,18 @@ def test_a_run_that_takes_a_thousand_steps_a_sample_ends_early_in_a_fit() -> Non
     ended = predicted(1e-12, float(fits.most_tries))
     assert np.isnan(ended).any(axis=-1).all()
     assert np.isfinite(ended[:, 0]).all()
+
+
+def test_the_tries_near_a_model_are_some_times_what_its_runs_need():
+    problem = _problem("dead weight", 0.1)
+    problem = with_integration(problem, choose_integration(problem, problem.system))
+    values = problem.start_values()
+    near = limited_near(problem, values)
+    given = problem.batch.integration.most_tries
+    assert given is not None
+    assert near.most_tries is not None
+    assert 4.5 * 4.0 < float(near.most_tries) < 0.5 * float(given)  # it needs 4.5 a sample
+    limited = predicted_at(with_integration(problem, near), [values])
+    np.testing.assert_array_equal(limited, predicted_at(problem, [values]))
+    needy = with_integration(problem, dataclasses.replace(problem.batch.integration, most_tries=jnp.asarray(10.0)))
+    assert float(limited_near(needy, values).most_tries) == 10.0  # more than an eighth of it: nothing is taken away

@@ -20,7 +20,9 @@ from smajax.attribution.unknown.terms import UNKNOWN
 from smajax.core.parameters import parameters
 from smajax.core.progress import Stage
 from smajax.data.experiment.record import Prior
+from smajax.fit.integration import limited_near, with_integration
 from smajax.fit.levenberg_marquardt import FitSettings
+from smajax.fit.outputs_of_runs import made_ready
 from smajax.fit.sensitivity import sensitivity
 from smajax.fit.starts import nearest
 from smajax.model.effects.candidate import PRIOR_ODDS
@@ -50,7 +52,9 @@ def with_terms(setting: Search, final: Model | FittedModel) -> tuple[Search, np.
     known = {name: Prior(0.0, setting.config.term_prior_sigma, False) for name in own}
     known |= setting.prior_records(presets=False)
     own_values = dataclasses.replace(plain.per_run, start=plain.per_run_at(jnp.asarray(final.values[index])))
-    problem = plain.with_system(whole, per_run=own_values, priors=known)
+    # A force that grows with speed lets a load shake: a trial point then takes a hundred times as long as any that a fit ends at.
+    problem = with_integration(plain, limited_near(plain, final.values[index]))
+    problem = problem.with_system(whole, per_run=own_values, priors=known)
     bounds = {**setting.bounds, **dict.fromkeys(own, (-LARGEST, LARGEST))}
     unknowns = tuple(setting.free(final.effects))
     search = Search(
@@ -185,8 +189,12 @@ def fitted_terms(
     """Every term fitted together with the parameters of the model with `effects`, from the best of its places."""
     settings = comparison_settings(FitSettings(cache=search.cache, progress=search.progress), "fitting unknown terms")
     groups = []
-    for program, terms in programs_of_terms(joint, effects, list(places)):
-        problem, index = joint.restricted(program)
+    programs = [
+        (program, terms, *joint.restricted(program))
+        for program, terms in programs_of_terms(joint, effects, list(places))
+    ]
+    made_ready([problem for _, _, problem, _ in programs])
+    for program, terms, problem, index in programs:
         begun = nearest(problem.with_noise(error), [places[term] for term in terms], index)
         groups.append((program, [BegunFit((*effects, term), at) for term, at in zip(terms, begun, strict=True)]))
     fits = fits_by_program(joint, groups, error, settings)

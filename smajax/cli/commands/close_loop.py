@@ -44,6 +44,7 @@ def run_close_loop(
     from smajax.attribution.close_loop import close_loop
     from smajax.cli.progress_display import displayed
     from smajax.cli.result_folder import claimed
+    from smajax.cli.written_beside import written_beside
     from smajax.data.experiment.fingerprint import fingerprint
     from smajax.report.narrative import narrated
     from smajax.report.write import write_report
@@ -56,19 +57,18 @@ def run_close_loop(
         in_words = narrated(progress, loaded.output_unit, loaded.output_name)
         shown = _rounds_shown(out)
 
-        def interim(known: Findings) -> None:
-            # A loop that resumes knows less at first than the page of the one that was stopped.
-            if len(known.rounds) >= shown:
-                write_report(known, out, loaded.path)
+        def write(known: Findings) -> Path:
+            return write_report(known, out, loaded.path)
 
-        findings = close_loop(
-            loaded,
-            memory=out / "fits",
-            progress=in_words,
-            command=command,
-            interim=interim,
-        )
-        return findings, write_report(findings, out, loaded.path)
+        with written_beside(write) as begin_page:
+
+            def interim(known: Findings) -> None:
+                # A loop that resumes knows less at first than the page of the one that was stopped.
+                if len(known.rounds) >= shown:
+                    begin_page(known)
+
+            findings = close_loop(loaded, memory=out / "fits", progress=in_words, command=command, interim=interim)
+        return findings, write(findings)
 
 
 def _rounds_shown(out: Path) -> int:
