@@ -15,16 +15,20 @@ OWN = re.compile(r"%[a-z]+\d+|%at\b|%turn\b")
 
 
 def phase_function(
-    phase: Phase, number: int, names: Names, uniform: Uniform, lanes: int, places: Mapping[str, int]
+    phase: Phase, number: int, names: Names, uniform: Uniform, lanes: int, places: Mapping[str, int], alone: bool
 ) -> tuple[str, list[str]]:
-    """The line that calls it, and the lines of the function; `places` are bytes in the thread's own memory."""
+    """The line that calls it, and the lines of the function; `places` are bytes in the thread's own memory.
+
+    `alone`: of a group of a single vector, where LLVM may put it in the place of its call.
+    """
     body = _body(phase, number, names, lanes, places)
     addresses, arguments = _from_outside(body, uniform)
     given = ["ptr {}%scratch", *(f"{uniform.kinds[one]} {{}}{one}" for one in arguments)]
     given += [] if phase.chosen else ["i64 {}%vectors"]
     called = ", ".join(one.format("") for one in given)
     taken = ", ".join([given[0].format("noalias "), *(one.format("") for one in given[1:])])
-    lines = [f"define internal void @phase{number}({taken}) noinline #0 {{", "entry:"]
+    attributes = "#0" if alone else "noinline #0"
+    lines = [f"define internal void @phase{number}({taken}) {attributes} {{", "entry:"]
     lines += [f"  {one} = {uniform.addresses[one]}" for one in addresses]
     return f"  call void @phase{number}({called})", [*lines, *body, "}"]
 

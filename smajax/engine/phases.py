@@ -265,7 +265,7 @@ def laid_out(
         lines += block.lines
         for phase in block.phases:
             if phase.loads or phase.stores or any(isinstance(one, Work) for one in phase.works):
-                call, function = phase_function(phase, number, names, uniform, lanes, places)
+                call, function = phase_function(phase, number, names, uniform, lanes, places, vectors == 1)
                 lines.append(call)
                 functions += function
             number += 1
