@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple, TypeVar
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -139,9 +140,11 @@ class Problem(eqx.Module):
 
     @property
     def noise(self) -> Float[Array, "series 1"]:
-        """Sigma of every series."""
-        each = jnp.broadcast_to(self.noise_sigma, (len(self.batch.outputs),))
-        return jnp.tile(each, self.batch.runs)[:, None]
+        """Sigma of every series; NumPy's where it is known, since a fit asks for it thousands of times."""
+        known = not isinstance(self.noise_sigma, jax.core.Tracer)
+        own: Any = np if known else jnp
+        each = own.broadcast_to(own.asarray(self.noise_sigma), (len(self.batch.outputs),))
+        return own.tile(each, self.batch.runs)[:, None]
 
     @property
     def shared(self) -> tuple[str, ...]:

@@ -50,14 +50,15 @@ WAVES = _waves()
 POWERS = _powers() @ WAVES
 
 
-@jax.jit  # traced once and not at each of the hundred places of a step
-def spline(coefficients: Sequence[Scalar], share: Scalar) -> Scalar:
-    """The function at `share` of its range, 0..1; outside of that what it is at the nearer end.
+def powers(coefficients: Sequence[Scalar]) -> list[Scalar]:
+    """The function's c_0 to c_3 and d_1, d_2, ... of `_powers`, from the sizes of its waves, the constant's first; those of a constant are zero but for that."""
+    return [sum(float(weight) * one for weight, one in zip(row, coefficients, strict=True)) for row in POWERS]
 
-    `coefficients` are the sizes of its waves, the constant's first; those of a constant are zero but for that.
-    """
+
+@jax.jit  # traced once and not at each of the hundred places of a step
+def spline(powers: Sequence[Scalar], share: Scalar) -> Scalar:
+    """The function at `share` of its range, 0..1; outside of that what it is at the nearer end."""
     u = PIECES * jnp.where(share < 0.0, 0.0, jnp.where(share > 1.0, 1.0, share))
-    powers = [sum(float(weight) * one for weight, one in zip(row, coefficients, strict=True)) for row in POWERS]
     found = powers[0] + u * (powers[1] + u * (powers[2] + u * powers[3]))
     for knot in range(1, PIECES):
         beyond = jnp.where(u > knot, u - knot, 0.0)

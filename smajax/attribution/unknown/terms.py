@@ -6,12 +6,13 @@ what it looks like, not what it is. With all coefficients zero each leaves the b
 
 from __future__ import annotations
 
-from typing import ClassVar
+import dataclasses
+from typing import ClassVar, Self
 
 import equinox as eqx
 import jax.numpy as jnp
 
-from smajax.attribution.unknown.spline import COUNT, spline
+from smajax.attribution.unknown.spline import COUNT, powers, spline
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
 from smajax.model.effects.candidate import Candidate, Equation
@@ -61,6 +62,7 @@ class AbstractUnknown(AbstractEffect):
     low: Scalar = eqx.field(converter=jnp.asarray, default=0.0)  # x_0, in the state's unit
     width: Scalar = eqx.field(converter=jnp.asarray, default=1.0)  # w
     scale: Scalar = eqx.field(converter=jnp.asarray, default=1.0)  # s, in the function's unit
+    powers: tuple[Scalar, ...] | None = None  # what `prepared` computes
 
     symbol: ClassVar[str]  # of the state
     state: ClassVar[str]  # the state in words
@@ -68,10 +70,17 @@ class AbstractUnknown(AbstractEffect):
     unit: ClassVar[str]  # of the function
     only_changes: ClassVar[bool] = False  # whether a constant f is none: drawn about its mean over the samples then
 
+    def prepared(self) -> Self:
+        """The same with the spline of its waves computed."""
+        return dataclasses.replace(self, powers=self._powers())
+
+    def _powers(self) -> tuple[Scalar, ...]:
+        return tuple(self.scale * one for one in powers([getattr(self, name) for name in COEFFICIENTS]))
+
     def value(self, x: Scalar) -> Scalar:
         """f(x)."""
-        coefficients = [getattr(self, name) for name in COEFFICIENTS]
-        return self.scale * spline(coefficients, (x - self.low) / self.width)
+        own = self._powers() if self.powers is None else self.powers
+        return spline(own, (x - self.low) / self.width)
 
 
 class LossOfTemperature(AbstractUnknown, HeatTerm):
