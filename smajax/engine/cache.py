@@ -18,7 +18,7 @@ from pathlib import Path
 import jax
 
 from smajax.core.files import writing
-from smajax.engine.kernel import COMPILE_OPTIONS, processor
+from smajax.engine.kernel import options_of, processor
 
 LARGEST = 2**30  # bytes in the folder: beyond, what was not used longest goes
 HEAD = b"smajax program 3\n"
@@ -47,10 +47,10 @@ def folder() -> Path | None:
     return Path(place) / "native"
 
 
-def key_of(text: str) -> str:
-    """Of a program by its text."""
+def key_of(text: str, quickly: bool = False) -> str:
+    """Of a program by its text, and whether it is compiled quickly."""
     packages = versions().split(", ", 1)[1]  # the interpreter has no part in it
-    options = ", ".join(f"{name} {value}" for name, value in sorted(COMPILE_OPTIONS.items()))
+    options = ", ".join(f"{name} {value}" for name, value in sorted(options_of(quickly).items()))
     return hashlib.sha256("\n".join([packages, processor(), options, text]).encode()).hexdigest()
 
 

@@ -156,19 +156,21 @@ def program(
     engine: Engine = "auto",
     devices: Sequence[jax.Device] = (),
     beside: bool = False,
+    quickly: bool = False,
 ) -> Program:
     """`function(model, own)` compiled for models of this kind; `names` are those of the numbers that a run has of its own.
 
     `alone`: for one run at a time. `devices`: where XLA would run it; under "auto" anything but a processor is XLA's. `beside`: it is compiled beside
-    the caller, who waits for it at its first call, and may have others traced meanwhile.
+    the caller, who waits for it at its first call, and may have others traced meanwhile. `quickly`: of a program that is run for less time than it takes to compile,
+    which takes half the time or less, and a run a tenth longer.
     Raises, under "native" alone, what stands in the way of machine code: Unsupported for what has no translation,
     ImportError without llvmlite, and whatever else goes wrong. What the function itself raises is always raised.
     """
     meant = engine_of(engine)
     if meant == "auto" and devices and devices[0].platform != "cpu":
         meant = "xla"
-    key = (key_of(function, model, names), alone, meant)
-    return cached(_programs, key, lambda: _made(function, model, names, alone, meant, beside))
+    key = (key_of(function, model, names), alone, meant, quickly)
+    return cached(_programs, key, lambda: _made(function, model, names, alone, meant, beside, quickly))
 
 
 @contextmanager
@@ -184,7 +186,9 @@ def _collector_paused() -> Iterator[None]:
 
 
 @_collector_paused()
-def _made(function: Function, model: Any, names: tuple[str, ...], alone: bool, engine: Engine, beside: bool) -> Program:
+def _made(
+    function: Function, model: Any, names: tuple[str, ...], alone: bool, engine: Engine, beside: bool, quickly: bool
+) -> Program:
     if engine == "xla":
         return Program(function, model, names, alone, None)
     traced = Traced(function, model, names)  # what goes wrong in here goes wrong by XLA too
@@ -195,7 +199,7 @@ def _made(function: Function, model: Any, names: tuple[str, ...], alone: bool, e
         # Imported here: the translator reads names of JAX that a release may move, and then XLA has to run all the same.
         from smajax.engine.native import NativeProgram
 
-        native = NativeProgram(traced, alone, beside)
+        native = NativeProgram(traced, alone, beside, quickly)
     except Exception as error:
         if engine == "native":
             raise

@@ -26,11 +26,18 @@ COMPILE_OPTIONS = {
     "slp_vectorization": False,
     "loop_unrolling": False,
 }
+# In half to a quarter of the time, for a tenth of a run's, of very long programs a third: of programs that are not run for long.
+QUICK_OPTIONS = {**COMPILE_OPTIONS, "codegen_level": 0}
 # Characters of a program beyond which LLVM's passes on loops cost more than they gain: half of its time or more, for a twentieth of a run's.
 LONG = 800_000
 
 
-def _machine() -> Any:
+def options_of(quickly: bool) -> dict[str, Any]:
+    """LLVM's options; `quickly`: of a program that is not run for long."""
+    return QUICK_OPTIONS if quickly else COMPILE_OPTIONS
+
+
+def _machine(quickly: bool = False) -> Any:
     """A new one for every program: what runs a program takes it over."""
     import llvmlite.binding as llvm
 
@@ -38,7 +45,7 @@ def _machine() -> Any:
     llvm.initialize_native_asmprinter()
     features = ",".join(f"{'+' if has else '-'}{name}" for name, has in sorted(_features().items()))
     return llvm.Target.from_default_triple().create_target_machine(
-        cpu=llvm.get_host_cpu_name(), features=features, opt=COMPILE_OPTIONS["codegen_level"], jit=True
+        cpu=llvm.get_host_cpu_name(), features=features, opt=options_of(quickly)["codegen_level"], jit=True
     )
 
 
@@ -90,11 +97,11 @@ def processor() -> str:
     return f"{llvm.get_default_triple()} {llvm.get_host_cpu_name()} {able}"
 
 
-def compiled(translated: Translated) -> bytes:
+def compiled(translated: Translated, quickly: bool = False) -> bytes:
     """The machine code of a translated program, an object file."""
     import llvmlite.binding as llvm
 
-    machine = _machine()
+    machine = _machine(quickly)
     module = llvm.parse_assembly(translated.text)
     module.triple, module.data_layout = machine.triple, str(machine.target_data)
     module.verify()
@@ -102,19 +109,19 @@ def compiled(translated: Translated) -> bytes:
     for name in ("loop_vectorization", "slp_vectorization", "loop_unrolling"):
         setattr(options, name, COMPILE_OPTIONS[name])
     builder = llvm.create_pass_builder(machine, options)
-    _passes(builder, long=len(translated.text) > LONG).run(module, builder)
+    _passes(builder, few=quickly or len(translated.text) > LONG).run(module, builder)
     return bytes(machine.emit_object(module))
 
 
-def _passes(builder: Any, long: bool) -> Any:
-    """LLVM's own passes for its level; of a long program the one alone that makes it quicker.
+def _passes(builder: Any, few: bool) -> Any:
+    """LLVM's own passes for its level; `few`: the one alone that makes a long program quicker.
 
     Not its new numbering of values (NewGVN), which ends the process at some programs of 2 MB ("Seem to have processed the same Value a lot",
     llvmlite 0.50), and gains nothing: the translator gives equal values one name.
     """
     import llvmlite.binding as llvm
 
-    if not long or not COMPILE_OPTIONS["speed_level"]:
+    if not few or not COMPILE_OPTIONS["speed_level"]:
         return builder.getModulePassManager()
     passes = llvm.create_new_module_pass_manager()
     passes.add_instruction_combine_pass()

@@ -24,8 +24,8 @@ MOST_SORTED = 6  # numbers of a run that are looked at for that
 class NativeProgram:
     """`function(model, own)` of one run as a function of whole arrays, for models with arrays of the same shapes."""
 
-    def __init__(self, traced: Traced, alone: bool, beside: bool = False) -> None:
-        """`alone`: for one run at a time. `beside`: compiled by another thread, for which the first call waits.
+    def __init__(self, traced: Traced, alone: bool, beside: bool = False, quickly: bool = False) -> None:
+        """`alone`: for one run at a time. `beside`: compiled by another thread, for which the first call waits. `quickly`: as of `program`.
 
         Raises Unsupported for what has no translation, and whatever LLVM raises: beside, at the first call.
         """
@@ -36,7 +36,7 @@ class NativeProgram:
         vectors = 1 if alone else VECTORS
         translated = translate(program, own, lanes_of(dtypes), divides_slowly(), vectors, mask_of(dtypes))
         self.scratch = translated.scratch  # memory that a thread works in, bytes
-        self._kernel = _begun(translated) if beside else _done(translated)
+        self._kernel = _begun(translated, quickly) if beside else _done(translated, quickly)
         self._tree, self._names, self._dtype = traced.tree, traced.names, traced.number
         self._shared = [np.dtype(kind) for kind in kinds[: traced.shared]]
 
@@ -58,31 +58,31 @@ class NativeProgram:
         return jax.tree.unflatten(self._tree, [one[back] for one in self._kernel.result()(shared, values, threads)])
 
 
-def _done(translated: Translated) -> Future[Kernel]:
+def _done(translated: Translated, quickly: bool) -> Future[Kernel]:
     """Compiled now."""
     made: Future[Kernel] = Future()
     with compiling():
-        made.set_result(_kernel(translated))
+        made.set_result(_kernel(translated, quickly))
     return made
 
 
-def _begun(translated: Translated) -> Future[Kernel]:
+def _begun(translated: Translated, quickly: bool) -> Future[Kernel]:
     """Compiled by another thread: LLVM lets Python go on."""
     pool = ThreadPoolExecutor(1)
     try:
-        coming = pool.submit(_kernel, translated)
+        coming = pool.submit(_kernel, translated, quickly)
     except RuntimeError:  # no room for another thread under a cap on memory
-        return _done(translated)
+        return _done(translated, quickly)
     pool.shutdown(wait=False)
     return coming
 
 
-def _kernel(translated: Translated) -> Kernel:
+def _kernel(translated: Translated, quickly: bool) -> Kernel:
     """Loaded from the disk, or compiled and stored there."""
-    key = cache.key_of(translated.text)
+    key = cache.key_of(translated.text, quickly)
     code = cache.load(key)
     if code is None:
-        code = compiled(translated)
+        code = compiled(translated, quickly)
         cache.save(key, code)
     return Kernel(code, translated.lanes, translated.results, translated.scratch)
 

@@ -26,6 +26,7 @@ from smajax.simulation.steppers import Integration
 
 Result = TypeVar("Result")
 MAX_BYTES = 2**28  # of predicted outputs at once: of long runs some points after the others
+SHORT = 4000  # samples of all runs, up to which quick compiling saves more time than the runs then lose
 FEW = 256  # points up to which derivatives that nobody needs are quicker than compiling a second program without them
 
 
@@ -60,6 +61,11 @@ def _runs(problem: Problem) -> list[_Run]:
         )
         for run in range(batch.runs)
     ]
+
+
+def _quickly(problem: Problem) -> bool:
+    """Whether its programs are compiled quickly."""
+    return problem.measured.size <= SHORT
 
 
 def _predict(run: _Run, values: jax.Array) -> jax.Array:
@@ -114,7 +120,7 @@ def predicted_at(problem: Problem, points: Sequence[np.ndarray] | np.ndarray) ->
     outputs = []
     for number, run in enumerate(_runs(problem)):
         scalars = _columns("value", _of_run(problem, rows, number))
-        outputs.append(program(_at, run, tuple(scalars))(run, scalars))
+        outputs.append(program(_at, run, tuple(scalars), quickly=_quickly(problem))(run, scalars))
     return np.concatenate(outputs, axis=1)
 
 
@@ -147,7 +153,7 @@ def made_ready(problems: Sequence[Problem]) -> None:
         for number, run in enumerate(_runs(problem)):
             at = _of_run(problem, nothing, number)
             names = tuple({**_columns("value", at), **_columns("tangent", at)})
-            begun.append(program(_along, run, names, beside=True))
+            begun.append(program(_along, run, names, beside=True, quickly=_quickly(problem)))
     for one in begun:
         one.wait()
 
@@ -167,7 +173,9 @@ def predicted_and_derivatives(
     for number, run in enumerate(_runs(problem)):
         at, along = (_of_run(problem, part, number) for part in pairs)
         scalars = {**_columns("value", at), **_columns("tangent", along)}
-        calls.append(partial(program(_along, run, tuple(scalars)), run, scalars))  # and the number of threads
+        calls.append(
+            partial(program(_along, run, tuple(scalars), quickly=_quickly(problem)), run, scalars)
+        )  # and the number of threads
     results = _side_by_side(calls)
     values = [value[::directions] for value, _ in results]
     derivatives = [derivative.reshape(count, directions, *derivative.shape[1:]) for _, derivative in results]
