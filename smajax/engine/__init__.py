@@ -12,8 +12,8 @@ last, in phases (`phases`) that keep their results in registers.
 Also public, for who divides runs into chunks: the sizes of blocks that XLA runs (`block_size`, `rounded`, `ON_CARD`, `on_card`), and what keys
 and bounds a cache of traced functions (`key_of`, `cached`).
 
-jaxpr (`translate`, `array_operations`, `jax_versions`) -> LLVM's language (`text`, `arithmetic`, `parts`, `phases`, `phase_functions`) -> machine code, and threads that run it
-(`kernel`), cached on disk (`cache`); or `xla`.
+jaxpr (`translate`, `array_operations`, `jax_versions`) -> LLVM's language (`text`, `arithmetic`, `parts`, `phases`, `phase_functions`) ->
+machine code, and threads that run it (`kernel`), cached on disk (`cache`); or `xla`.
 """
 
 from smajax.engine.arguments import key_of as key_of

@@ -98,14 +98,14 @@ def limited_near(problem: Problem, values: np.ndarray) -> Integration:
 
     The need is known to a factor of two, and not below `1 / LEAST_SHARE` of what it has.
     """
-    integration = problem.batch.integration
-    if integration.most_tries is None:
+    integration, share = problem.batch.integration, LEAST_SHARE
+    most = integration.most_tries
+    if most is None:
         return integration
-    share = LEAST_SHARE
     while share > NEARBY:
-        needed = dataclasses.replace(integration, most_tries=integration.most_tries / share)
+        needed = dataclasses.replace(integration, most_tries=most / share)
         if np.isfinite(predicted_at(with_integration(problem, needed), [values])).all():
-            return dataclasses.replace(needed, most_tries=NEARBY * needed.most_tries)
+            return dataclasses.replace(integration, most_tries=NEARBY * most / share)
         share //= 2
     return integration
 

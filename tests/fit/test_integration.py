@@ -144,4 +144,4 @@ def test_the_tries_near_a_model_are_some_times_what_its_runs_need():
     limited = predicted_at(with_integration(problem, near), [values])
     np.testing.assert_array_equal(limited, predicted_at(problem, [values]))
     needy = with_integration(problem, dataclasses.replace(problem.batch.integration, most_tries=jnp.asarray(10.0)))
-    assert float(limited_near(needy, values).most_tries) == 10.0  # more than an eighth of it: nothing is taken away
+    assert limited_near(needy, values).most_tries == 10.0  # more than an eighth of it: nothing is taken away

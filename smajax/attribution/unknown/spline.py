@@ -9,7 +9,9 @@ smoothness prior; Wahba 1990, chapter 1), where independent B-splines would each
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Sequence
+from functools import reduce
 
 import jax
 import jax.numpy as jnp
@@ -52,7 +54,8 @@ POWERS = _powers() @ WAVES
 
 def powers(coefficients: Sequence[Scalar]) -> list[Scalar]:
     """The function's c_0 to c_3 and d_1, d_2, ... of `_powers`, from the sizes of its waves, the constant's first; those of a constant are zero but for that."""
-    return [sum(float(weight) * one for weight, one in zip(row, coefficients, strict=True)) for row in POWERS]
+    weighed = ([float(weight) * one for weight, one in zip(row, coefficients, strict=True)] for row in POWERS)
+    return [reduce(operator.add, row) for row in weighed]
 
 
 @jax.jit  # traced once and not at each of the hundred places of a step

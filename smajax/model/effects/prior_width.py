@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -91,7 +91,7 @@ def stated_width(effect: type[AbstractEffect], coefficient: str) -> Width:
 
 def entry_of(effect: type[AbstractEffect], coefficient: str) -> Parameter:
     """Unit, bounds and meaning of a coefficient; ValueError, with close matches, where the effect has none of that name."""
-    entries = _base_values(effect, jnp.zeros(()).dtype)[0]
+    entries = _at_base(effect)[0]
     if coefficient not in entries:
         near = close_matches(coefficient, sorted(entries), "it has")
         raise ValueError(f"The effect `{effect.effect_name}` has no coefficient `{coefficient}`{near}.")
@@ -123,16 +123,24 @@ def _scale(of: Scale, extent: Extent, load_at_rest: float) -> float:
     return scales[of]
 
 
+Values = tuple[dict[str, Parameter], dict[str, float]]  # by name
+
+
+def _at_base(effect: type[AbstractEffect]) -> Values:
+    """(entries, values) of an effect's coefficients at its base."""
+    return _at_base_in(effect, jnp.zeros(()).dtype)  # type: ignore[arg-type]  # mypy asks for the hash of an instance
+
+
 @cache
-def _base_values(effect: type[AbstractEffect], _: np.dtype) -> tuple[dict[str, Parameter], dict[str, float]]:
-    """(entries, values) of an effect's coefficients at its base, by name; the kind of numbers is that of the values."""
+def _at_base_in(effect: type[AbstractEffect], _: np.dtype[Any]) -> Values:
+    """The same; the kind of numbers is that of the values."""
     base, prefix = effect.base(), f"{effect.effect_name}."
     entries = {name.removeprefix(prefix): one for name, one in parameters(base).items()}
     return entries, {name: float(getattr(base, name)) for name in entries}
 
 
 def _default(effect: type[AbstractEffect], coefficient: str) -> float:
-    return _base_values(effect, jnp.zeros(()).dtype)[1][coefficient]
+    return _at_base(effect)[1][coefficient]
 
 
 def _base(effect: type[AbstractEffect], coefficient: str, width: Width) -> float:
