@@ -86,7 +86,7 @@ def close_loop(  # keywords, which a caller names one by one
     Held-out runs are simulated when the search is over: they reject what they do not validate, and nothing is added
     for them. The caller chooses precision; anything but float64 is refused with a ValueError, because the
     differences that decide here are far below float32's rounding over a run. `interim` gets what is known after the base fit, in a long search
-    now and then, and after it where other stages follow: findings without a verdict, which say what is still to come. Raises PluginError for an effect of another
+    now and then, and after it where other stages follow: findings without a verdict, which say what is still to come; it may return the seconds that what it does beside the search takes. Raises PluginError for an effect of another
     package that changes the model at its base value: every verdict would be wrong.
     """
     if jnp.zeros(()).dtype != jnp.float64:
@@ -184,9 +184,9 @@ def _now_and_then(context: Context, interim: Interim) -> Callable[[JointSearch, 
         nonlocal began, cost
         now = clock.monotonic()
         if best.effects and now - began > RARELY * cost:
-            interim(known_so_far(context, likeliest_so_far(search, best), Remaining.REST_OF_THE_SEARCH))
+            beside = interim(known_so_far(context, likeliest_so_far(search, best), Remaining.REST_OF_THE_SEARCH))
             began = clock.monotonic()
-            cost = began - now
+            cost = max(began - now, beside if isinstance(beside, float) else 0.0)
 
     return after_round
 

@@ -47,7 +47,8 @@ class _Stage:
     settings: FitSettings
     excluded: set[str] = field(default_factory=set)
     asked: list[AskedFor] = field(default_factory=list)  # unknown terms beside the base model, once they were asked for
-    asks_for_records: bool = True  # whether the record of a run may be found wrong, until it was asked for
+    # Kinds of search (`thorough`) in which it was asked for a wrong record of a run, or is not to be.
+    asked_for_records: set[bool] = field(default_factory=set)
 
     def joint_search(self, presets: Mapping[str, CoefficientPrior]) -> JointSearch:
         """Among the candidates that were not excluded."""
@@ -69,7 +70,7 @@ class _Stage:
         if search.thorough:  # else values of presets are held, which no function is beside
             search.in_place_of_many = partial(self.in_place_of_many, search)
             search.before_the_end = partial(self.before_the_end, search)
-            search.has_wrong_record = partial(self.has_wrong_record, search)
+        search.has_wrong_record = partial(self.has_wrong_record, search)
         return search
 
     def searched(self, base: np.ndarray) -> tuple[JointSearch, FittedModel]:
@@ -88,7 +89,7 @@ class _Stage:
         # And without what looks much the same, which has been tried in their place.
         alike = {name for name in search.joint.coefficients for one in doubted if replaceable(name, one)}
         # No record is asked for without them: it would be held against less likely models than were found.
-        rest = _Stage(self.setting, self.settings, self.excluded | alike | set(doubted), self.asked, False)
+        rest = _Stage(self.setting, self.settings, self.excluded | alike | set(doubted), self.asked, {True, False})
         other, instead = rest._from_base(base, search.programs)
         search.fitted = {**other.fitted, **search.fitted}
         error = search.error(search.best(search.error(found)))
@@ -114,7 +115,8 @@ class _Stage:
         if after.rms < FREED_SHARE * before.rms:
             return free, search_jointly(free, {(): after.values})
         held.programs = free.programs
-        return self.resumed(held, search_jointly(held, {(): base}))
+        found = search_jointly(held, {(): base})
+        return (held, found) if held.wrong_record else self.resumed(held, found)
 
     def in_place_of_many(self, search: JointSearch, found: FittedModel) -> FittedModel | None:
         """`found` itself where it has many effects that leave more than noise, and an unknown function in the base model that is named leaves only noise and is likelier.
@@ -130,19 +132,23 @@ class _Stage:
         return self._one_effect(search, found, [named]) or found
 
     def has_wrong_record(self, search: JointSearch, found: FittedModel) -> bool:
-        """Whether an input of one run was recorded wrongly, asked once, where `found` has many effects and leaves many noises.
+        """Whether an input of one run was recorded wrongly, asked once a search, where `found` has many effects and leaves many noises.
 
         They may stand in for it, and each round about them costs more than to ask. It is sought beside those of the base model, the likeliest model of few effects, and `found`
-        that leave much less of the other runs when one run is left out.
+        that leave much less of the other runs when one run is left out; as long as none does, it is not asked.
         """
-        if self.setting.wrong_record is None or not self.asks_for_records or found.rms < FAR_LESS * search.noise:
+        asked = self.setting.wrong_record is None or search.thorough in self.asked_for_records
+        if asked or found.rms < FAR_LESS * search.noise:
             return False
-        self.asks_for_records = False
         few = [one for one in search.fitted.values() if 0 < len(one.effects) < MANY]
         variance = min(map(search.error, few), default=1.0) ** 2
         likeliest = sorted(few, key=lambda one: -one.log_evidence(variance))[:1]
         hosts = [one for one in (search.fitted[()], *likeliest, found) if self._better_without_a_run(search, one)]
-        search.wrong_record = self.setting.wrong_record(hosts, found) if hosts else None
+        if not hosts:
+            return False
+        self.asked_for_records.add(search.thorough)
+        assert self.setting.wrong_record is not None
+        search.wrong_record = self.setting.wrong_record(hosts, found)
         return search.wrong_record is not None
 
     def _better_without_a_run(self, search: JointSearch, model: FittedModel) -> bool:
@@ -151,7 +157,11 @@ class _Stage:
         programs = [search.joint.ordered(one) for one in search.programs]
         fitting = [one for one in programs if set(model.effects) <= set(one)]
         program = min(fitting, key=len, default=model.effects)
-        before, after = left_of_the_others(search.joint, model, search.error(model), program)
+        joint = self.setting.joint(
+            self.setting.candidates
+        )  # values of presets are free beside a record that is corrected
+        here = fitted_model(joint, model.effects, model.values, program)
+        before, after = left_of_the_others(joint, here, search.error(model), program)
         return bool((after < np.maximum(LEFT_WITHOUT_A_RUN * before, NEAR_NOISE * search.noise)).any())
 
     def before_the_end(self, search: JointSearch, found: FittedModel) -> FittedModel | None:
@@ -291,7 +301,7 @@ def search_without(setting: Search, search: JointSearch, effects: Sequence[str])
     stage = _Stage(setting, _settings(setting), {*search.excluded, *effects})
     if search.lacking is not None:
         stage.asked.append(search.lacking)  # of the same base model
-    stage.asks_for_records = False  # no longer, once held-out runs have been looked at
+    stage.asked_for_records = {True, False}  # no longer, once held-out runs have been looked at
     return _kept_at_half_step(stage, lambda: stage.resumed(search))
 
 

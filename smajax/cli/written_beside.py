@@ -2,31 +2,42 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import TypeVar
 
+from smajax.cli.terminal import interrupts_answered
+
 Known = TypeVar("Known")
 
 
 @contextmanager
-def written_beside(write: Callable[[Known], object]) -> Iterator[Callable[[Known], None]]:
-    """`write` by another thread, one page after the other; at the end, also of a search that is interrupted, the last one is whole.
+def written_beside(write: Callable[[Known], object]) -> Iterator[Callable[[Known], float]]:
+    """`write` by another thread, one page after the other; each call gives the seconds that the page before took.
 
-    What `write` raises is raised by the next call, or at the end.
+    One that is being written at the end is written to its end, also of a search that Ctrl-C ends. What `write` raises is raised by the next call;
+    at the end it is not, since the page of the whole result follows.
     """
-    last: list[Future[object]] = []
+    pool = ThreadPoolExecutor(1)
+    last: list[Future[float]] = []
 
-    def begin(known: Known) -> None:
-        if last:
-            last.pop().result()
+    def timed(known: Known) -> float:
+        began = time.monotonic()
+        write(known)
+        return time.monotonic() - began
+
+    def begin(known: Known) -> float:
+        took = last.pop().result() if last else 0.0
         try:
-            last.append(pool.submit(write, known))
+            last.append(pool.submit(timed, known))
         except RuntimeError:  # no room for another thread under a cap on memory
-            write(known)
+            took = timed(known)
+        return took
 
-    with ThreadPoolExecutor(1) as pool:
+    try:
         yield begin
-        if last:
-            last.pop().result()
+    finally:
+        with interrupts_answered():
+            pool.shutdown()

@@ -27,14 +27,14 @@ COMPILE_OPTIONS = {
     "loop_unrolling": False,
 }
 # In half to a quarter of the time, for a tenth of a run's, of very long programs a third: of programs that are not run for long.
-QUICK_OPTIONS = {**COMPILE_OPTIONS, "codegen_level": 0}
+QUICK = {"codegen_level": 0}
 # Characters of a program beyond which LLVM's passes on loops cost more than they gain: half of its time or more, for a twentieth of a run's.
 LONG = 800_000
 
 
 def options_of(quickly: bool) -> dict[str, Any]:
     """LLVM's options; `quickly`: of a program that is not run for long."""
-    return QUICK_OPTIONS if quickly else COMPILE_OPTIONS
+    return {**COMPILE_OPTIONS, **QUICK, "quickly": True} if quickly else COMPILE_OPTIONS
 
 
 def _machine(quickly: bool = False) -> Any:

@@ -27,6 +27,14 @@ TYPES = {
 }
 
 
+# How the lines of addresses and whole numbers begin, and LLVM's kind of these.
+SCALARS = (
+    ("getelementptr ", "ptr"),
+    ("load ptr,", "ptr"),
+    *((f"{name} i64 ", "i64") for name in ("add", "sub", "mul", "udiv", "urem")),
+)
+
+
 class Unsupported(ValueError):
     """The program holds something that is not translated; says what."""
 
@@ -131,12 +139,13 @@ class Text:
         return name
 
     def _note_uniform(self, name: str, right: str, dtype: str | None) -> None:
-        """What a phase that uses it needs to know: its kind, or how to compute it again. All but vectors are addresses and whole numbers."""
-        is_address = right.startswith("getelementptr ")
-        if is_address:
+        """What a phase that uses it needs to know: its kind, or how to compute it again. Phases use vectors, addresses and whole numbers."""
+        if right.startswith("getelementptr "):
             self.uniform.addresses[name] = right
-        scalar = "ptr" if is_address or right.startswith("load ptr,") else "i64"
-        self.uniform.kinds[name] = self.vector(dtype) if dtype is not None else scalar
+        scalar = next((kind for start, kind in SCALARS if right.startswith(start)), None)
+        kind = scalar if dtype is None else self.vector(dtype)
+        if kind is not None:
+            self.uniform.kinds[name] = kind
 
     def layout(self, dtype: str) -> Layout:
         """Of what differs from vector to vector."""

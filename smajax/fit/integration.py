@@ -26,8 +26,9 @@ LARGEST = 0.1  # of an output's noise: the error, rms over a run, that integrati
 # without damping some 600 a second. A trial point at which a force grows with speed, so that the load shakes, takes 10,000 a second: half a minute
 # of one fit's ten. It has no numbers then, and no fit goes there.
 TRIES_A_SECOND, TRIES_A_SAMPLE, AT_TOLERANCE = 2000.0, 100.0, 1e-4
-# Of the tries that a model needs, so many a model may need that has one smooth function more; a tenth of what a load needs that shakes.
+# Of the tries that a model needs, so many one may need that has a smooth function more, and what a load needs that swings without damping; a tenth of what one needs that shakes.
 NEARBY, LEAST_SHARE = 8, 64
+SWINGING = 1000.0  # a second
 MARGIN = 0.5  # of that, at the start: by the end of a fit its values have moved
 
 
@@ -94,18 +95,20 @@ def unlimited(integration: Integration) -> Integration:
 
 
 def limited_near(problem: Problem, values: np.ndarray) -> Integration:
-    """The problem's integration with `NEARBY` times the tries that its runs need at `values` (P,), where that is less than it has.
+    """The problem's integration with `NEARBY` times the tries that its runs need at `values` (P,), and those of a load that swings, where that is less than it has.
 
     The need is known to a factor of two, and not below `1 / LEAST_SHARE` of what it has.
     """
     integration, share = problem.batch.integration, LEAST_SHARE
-    most = integration.most_tries
-    if most is None:
+    most, tolerance = integration.most_tries, integration.tolerance
+    if most is None or tolerance is None:
         return integration
+    swinging = SWINGING * float(np.asarray(problem.batch.dt)) * (AT_TOLERANCE / tolerance) ** (1.0 / 3.0)
     while share > NEARBY:
         needed = dataclasses.replace(integration, most_tries=most / share)
         if np.isfinite(predicted_at(with_integration(problem, needed), [values])).all():
-            return dataclasses.replace(integration, most_tries=NEARBY * most / share)
+            allowed = jnp.minimum(jnp.maximum(NEARBY * most / share, swinging), most)
+            return dataclasses.replace(integration, most_tries=allowed)
         share //= 2
     return integration
 

@@ -26,7 +26,7 @@ from smajax.simulation.steppers import Integration
 
 Result = TypeVar("Result")
 MAX_BYTES = 2**28  # of predicted outputs at once: of long runs some points after the others
-SHORT = 4000  # samples of all runs, up to which quick compiling saves more time than the runs then lose
+SHORT = 1000  # samples of a run, up to which quick compiling saves more time than the runs of a fit then lose
 FEW = 256  # points up to which derivatives that nobody needs are quicker than compiling a second program without them
 
 
@@ -64,8 +64,8 @@ def _runs(problem: Problem) -> list[_Run]:
 
 
 def _quickly(problem: Problem) -> bool:
-    """Whether its programs are compiled quickly."""
-    return problem.measured.size <= SHORT
+    """Whether its programs are compiled quickly: by what each of them is made for, the length of a run."""
+    return problem.batch.output.shape[-1] <= SHORT
 
 
 def _predict(run: _Run, values: jax.Array) -> jax.Array:

@@ -141,6 +141,7 @@ def _stage_and_search(
         lacking=None,
         wrong_record=None,
         noise=1.0,
+        thorough=True,
         joint=SimpleNamespace(coefficients=("latent_heat", "sensor_drift", "sensor_gain")),
         excluded=frozenset({"sensor_gain"}),
     )
@@ -229,16 +230,22 @@ def test_a_wrong_record_is_asked_for_once_where_many_effects_leave_many_noises(
         asked.append([one.effects for one in (*hosts, present)])
         return FOUND
 
-    better = [True, False, False]
+    better = [False, False, False, True, False, False, True, True, True]
     monkeypatch.setattr(joint_stage._Stage, "_better_without_a_run", lambda *_: better.pop(0))
 
     stage.setting.wrong_record = wrong_record
     search.fitted |= {effects: _model(effects, 5.0, odds) for effects, odds in ((THREE[:1], 3.0), (THREE[1:], 1.0))}
     assert not stage.has_wrong_record(search, cast(Any, _model(THREE, 3.0, 9.0)))  # little is missing
-    assert stage.has_wrong_record(search, cast(Any, _model(THREE, 5.0, 9.0)))
+    many = cast(Any, _model(THREE, 5.0, 9.0))
+    assert not stage.has_wrong_record(search, many)  # no run keeps anything from the others: it is not asked yet
+    assert stage.has_wrong_record(search, many)
     assert search.wrong_record is FOUND
-    assert not stage.has_wrong_record(search, cast(Any, _model(THREE, 5.0, 9.0)))
+    assert not stage.has_wrong_record(search, many)
     assert asked == [[(), THREE]]
+    search.thorough = False  # the values of presets are held in another search
+    assert stage.has_wrong_record(search, many)
+    assert not stage.has_wrong_record(search, many)
+    assert asked[1:] == [[(), THREE[:1], THREE, THREE]]
 
 
 def _begun(
@@ -299,7 +306,9 @@ def test_without_what_held_out_runs_reject_nothing_is_asked_for_again(monkeypatc
     assert stage.excluded == {"creep", "latent_heat"}
     assert stage.asked == [known]
     setting.wrong_record = lambda *_: pytest.fail("a record was asked for")
-    assert not stage.has_wrong_record(cast(Any, SimpleNamespace(noise=1.0)), cast(Any, _model(THREE, 5.0, 9.0)))
+    assert not stage.has_wrong_record(
+        cast(Any, SimpleNamespace(noise=1.0, thorough=True)), cast(Any, _model(THREE, 5.0, 9.0))
+    )
 
 
 def test_effects_stand_by_how_much_the_model_needs_them_even_where_it_was_never_fitted_without() -> None:

@@ -52,22 +52,25 @@ def test_a_loop_that_resumes_leaves_a_page_that_knows_more_until_it_knows_as_muc
     assert (ended_after(rounds, "resumed") == before) == (rounds < 2)
 
 
-def test_a_long_search_gives_what_it_has_found_so_far(monkeypatch: pytest.MonkeyPatch) -> None:
-    """After its first round already where it may, and then only when much more time has passed than that took."""
+@pytest.mark.parametrize("beside", [False, True])
+def test_a_long_search_gives_what_it_has_found_so_far(beside: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """After its first round already where it may, and then only when much more time has passed than that took, or takes beside the search."""
     given, now = [], [0.0]
     monkeypatch.setattr(stages, "known_so_far", lambda context, models, rest: models[1])
     monkeypatch.setattr(stages, "likeliest_so_far", lambda search, best: (search, best.effects, None))
     monkeypatch.setattr("smajax.attribution.close_loop.clock.monotonic", lambda: now[0])
 
-    def shown(effects: Any) -> None:
+    def shown(effects: Any) -> float:
         given.append((now[0], effects))
-        now[0] += 5.0
+        now[0] += 0.0 if beside else 5.0
+        return 5.0 if beside else 0.0
 
     after_round = stages._now_and_then(cast(Any, None), shown)
     for later, effects in ((50.0, ("a",)), (20.0, ()), (5.0, ("a", "b")), (20.0, ("a", "c")), (30.0, ("a", "c"))):
         now[0] += later
         after_round(cast(Any, None), cast(Any, SimpleNamespace(effects=effects)))
-    assert given == [(75.0, ("a", "b")), (130.0, ("a", "c"))]
+    second = 125.0 if beside else 130.0
+    assert given == [(75.0, ("a", "b")), (second, ("a", "c"))]
 
 
 def test_the_page_is_there_after_the_base_fit_and_says_what_is_to_come(tmp_path: Path) -> None:

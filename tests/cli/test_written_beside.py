@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
 
 import pytest
@@ -37,10 +38,18 @@ def test_the_caller_goes_on_while_a_page_is_written_and_the_last_one_is_whole_at
     assert written == ["first", "second"]
 
 
-@pytest.mark.parametrize("pages", [("first", "second"), ("first",)])
-def test_what_cannot_be_written_is_raised_at_the_next_page_or_the_end(pages: tuple[str, ...]) -> None:
+def test_what_cannot_be_written_is_raised_at_the_next_page_but_not_at_the_end() -> None:
+    """There the page of the whole result follows, which says it where it still is so."""
+
     def write(page: str) -> None:
         raise OSError(page)
 
     with pytest.raises(OSError, match="first"):
-        _pages(write, *pages)
+        _pages(write, "first", "second")
+    _pages(write, "first")
+
+
+def test_how_long_the_page_before_took_is_said() -> None:
+    with written_beside(lambda _: time.sleep(0.05)) as begin:
+        assert begin("first") == 0.0
+        assert begin("second") >= 0.05

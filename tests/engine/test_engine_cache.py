@@ -158,6 +158,13 @@ def test_a_program_of_other_compile_options_is_not_used(programs: Path, monkeypa
     assert len(list(programs.iterdir())) == 2
 
 
+def test_a_program_that_is_compiled_quickly_has_a_key_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    keys = [cache.key_of("text", quickly) for quickly in (False, True)]
+    monkeypatch.setitem(kernel.COMPILE_OPTIONS, "speed_level", 2)
+    keys += [cache.key_of("text", quickly) for quickly in (False, True)]
+    assert len(set(keys)) == 4
+
+
 def test_a_program_of_another_processor_is_not_used(programs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A folder that machines share: what one runs may be an illegal instruction to another."""
     _run()

@@ -219,7 +219,7 @@ def test_an_unresolved_symbol_does_not_end_the_process(monkeypatch: pytest.Monke
     """LLVM's linker ends the process for it; under "auto" XLA runs the program, under "native" it is an error."""
     import llvmlite.binding as llvm
 
-    def nowhere(_: Any) -> bytes:
+    def nowhere(*_: Any) -> bytes:
         text = "declare double @no_such_function(double)\ndefine double @runs(double %x) {\n"
         text += "  %y = call double @no_such_function(double %x)\n  ret double %y\n}\n"
         return bytes(kernel._machine().emit_object(llvm.parse_assembly(text)))

@@ -105,3 +105,14 @@ def _small(a: jax.Array) -> jax.Array:
 def test_phases_over_any_number_of_vectors_equal_xla(function, vectors, mask):
     a = np.arange(150.0) % 41.0 - 3.0
     np.testing.assert_array_equal(by_machine_code(function, a, vectors=vectors, mask=mask), by_xla(function, a))
+
+
+@pytest.mark.parametrize("vectors", [1, 3])
+@pytest.mark.parametrize("function", [_busy, _crosswise, _uneven], ids=lambda one: one.__name__)
+def test_a_program_that_is_compiled_quickly_gives_the_same_numbers(
+    function: Callable[[jax.Array], jax.Array], vectors: int, optimised: None
+) -> None:
+    """With LLVM's levels as users have them."""
+    a = np.arange(150.0) % 41.0 - 3.0
+    quick = by_machine_code(function, a, vectors=vectors, quickly=True)
+    np.testing.assert_array_equal(quick, by_machine_code(function, a, vectors=vectors))

@@ -140,7 +140,7 @@ def test_the_tries_near_a_model_are_some_times_what_its_runs_need():
     given = problem.batch.integration.most_tries
     assert given is not None
     assert near.most_tries is not None
-    assert 4.5 * 4.0 < float(near.most_tries) < 0.5 * float(given)  # it needs 4.5 a sample
+    assert 4.5 * 8.0 < float(near.most_tries) <= 0.5 * float(given)  # it needs 4.5 a sample; a load that swings 100
     limited = predicted_at(with_integration(problem, near), [values])
     np.testing.assert_array_equal(limited, predicted_at(problem, [values]))
     needy = with_integration(problem, dataclasses.replace(problem.batch.integration, most_tries=jnp.asarray(10.0)))

@@ -62,10 +62,9 @@ def run_close_loop(
 
         with written_beside(write) as begin_page:
 
-            def interim(known: Findings) -> None:
+            def interim(known: Findings) -> float:
                 # A loop that resumes knows less at first than the page of the one that was stopped.
-                if len(known.rounds) >= shown:
-                    begin_page(known)
+                return begin_page(known) if len(known.rounds) >= shown else 0.0
 
             findings = close_loop(loaded, memory=out / "fits", progress=in_words, command=command, interim=interim)
         return findings, write(findings)
