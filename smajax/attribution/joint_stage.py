@@ -38,6 +38,7 @@ from smajax.model.effects.prior_width import CoefficientPrior
 LIKELIEST = 4  # sets of effects from which the search goes on with the values of presets free
 LEFT_WITHOUT_A_RUN = 0.3  # of the error on the other runs: of these a wrong record of one run explains most
 NEAR_NOISE = 1.5  # noises
+BESIDE_OTHERS = 0.5  # of what is left without the next run, which may be much where other effects are missing as well
 FREED_SHARE = 2.0 / 3.0  # of the base error, to which free values of presets lower it where the search begins so
 
 
@@ -134,8 +135,8 @@ class _Stage:
     def has_wrong_record(self, search: JointSearch, found: FittedModel) -> bool:
         """Whether an input of one run was recorded wrongly, asked once a search, where `found` has many effects and leaves many noises.
 
-        They may stand in for it, and each round about them costs more than to ask. It is sought beside those of the base model, the likeliest model of few effects, and `found`
-        that leave much less of the other runs when one run is left out; as long as none does, it is not asked.
+        They may stand in for it, and each round about them costs more than to ask. It is sought beside those of the base model and `found` that leave much less of the other runs when one run is left out, and the likeliest model
+        of few effects; as long as none does, it is not asked.
         """
         asked = self.setting.wrong_record is None or search.thorough in self.asked_for_records
         if asked or found.rms < FAR_LESS * search.noise:
@@ -143,16 +144,19 @@ class _Stage:
         few = [one for one in search.fitted.values() if 0 < len(one.effects) < MANY]
         variance = min(map(search.error, few), default=1.0) ** 2
         likeliest = sorted(few, key=lambda one: -one.log_evidence(variance))[:1]
-        hosts = [one for one in (search.fitted[()], *likeliest, found) if self._better_without_a_run(search, one)]
-        if not hosts:
+        models = [search.fitted[()], *likeliest, found]
+        better = [self._better_without_a_run(search, one) for one in models]
+        if not any(better):
             return False
+        # What many effects stand in for may be one of the few beside the record.
+        hosts = [one for one, much in zip(models, better, strict=True) if much or one in likeliest]
         self.asked_for_records.add(search.thorough)
         assert self.setting.wrong_record is not None
         search.wrong_record = self.setting.wrong_record(hosts, found)
         return search.wrong_record is not None
 
     def _better_without_a_run(self, search: JointSearch, model: FittedModel) -> bool:
-        """Whether without one run next to noise is left of the others, or little of what is."""
+        """Whether without one run next to noise is left of the others, or little of what is, or half of what is left without any other run."""
         # Of those that are compiled the smallest; what an earlier search carried may be in the base model since.
         programs = [search.joint.ordered(one) for one in search.programs]
         fitting = [one for one in programs if set(model.effects) <= set(one)]
@@ -162,7 +166,11 @@ class _Stage:
         )  # values of presets are free beside a record that is corrected
         here = fitted_model(joint, model.effects, model.values, program)
         before, after = left_of_the_others(joint, here, search.error(model), program)
-        return bool((after < np.maximum(LEFT_WITHOUT_A_RUN * before, NEAR_NOISE * search.noise)).any())
+        if len(after) < 2:
+            return False
+        least, second, *_ = np.sort(after)
+        little = after < np.maximum(LEFT_WITHOUT_A_RUN * before, NEAR_NOISE * search.noise)
+        return bool(little.any() or least < BESIDE_OTHERS * second)
 
     def before_the_end(self, search: JointSearch, found: FittedModel) -> FittedModel | None:
         """One effect that is likelier than those of `found`, in an equation where an unknown function is likelier than these too."""

@@ -241,11 +241,33 @@ def test_a_wrong_record_is_asked_for_once_where_many_effects_leave_many_noises(
     assert stage.has_wrong_record(search, many)
     assert search.wrong_record is FOUND
     assert not stage.has_wrong_record(search, many)
-    assert asked == [[(), THREE]]
+    assert asked == [[(), THREE[:1], THREE]]  # the likeliest of few effects as well
     search.thorough = False  # the values of presets are held in another search
     assert stage.has_wrong_record(search, many)
     assert not stage.has_wrong_record(search, many)
     assert asked[1:] == [[(), THREE[:1], THREE, THREE]]
+
+
+@pytest.mark.parametrize(
+    ("after", "better"),
+    [
+        ([0.2, 0.9, 0.95], True),  # of 1.0
+        ([0.45, 0.9, 0.95], False),
+        ([0.4, 0.9, 0.95], True),  # half of what is left without any other run
+        ([0.14, 0.15, 0.15], True),  # next to noise
+        ([0.2], False),  # nothing is left of the others
+    ],
+)
+def test_a_run_keeps_much_from_the_others_where_little_is_left_without_it(
+    after: list[float], better: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stage, search, _ = _stage_and_search(monkeypatch, [], [])
+    search.programs, search.noise, search.joint.ordered = (), 0.1, tuple
+    stage.setting.joint, stage.setting.candidates = lambda _: None, ()
+    monkeypatch.setattr(joint_stage, "fitted_model", lambda *_: None)
+    left = np.ones(len(after)), np.asarray(after)
+    monkeypatch.setattr(joint_stage, "left_of_the_others", lambda *_: left)
+    assert stage._better_without_a_run(search, cast(Any, _model(THREE, 5.0, 9.0))) is better
 
 
 def _begun(
