@@ -26,9 +26,10 @@ LARGEST = 0.1  # of an output's noise: the error, rms over a run, that integrati
 # without damping some 600 a second. A trial point at which a force grows with speed, so that the load shakes, takes 10,000 a second: half a minute
 # of one fit's ten. It has no numbers then, and no fit goes there.
 TRIES_A_SECOND, TRIES_A_SAMPLE, AT_TOLERANCE = 2000.0, 100.0, 1e-4
-# Of the tries that a model needs, so many one may need that has a smooth function more, and what a load needs that swings without damping; a tenth of what one needs that shakes.
+# A model that has one smooth function more may need so many times the tries of the one without, or those of a load that then swings; one that
+# shakes needs ten times these.
 NEARBY, LEAST_SHARE = 8, 64
-SWINGING = 1000.0  # a second
+SWINGING = 1000.0  # a second, at a tolerance of 1e-4
 MARGIN = 0.5  # of that, at the start: by the end of a fit its values have moved
 
 
