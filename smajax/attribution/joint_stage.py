@@ -138,8 +138,8 @@ class _Stage:
         They may stand in for it, and each round about them costs more than to ask. It is sought beside those of the base model and `found` that leave much less of the other runs when one run is left out, and the likeliest model
         of few effects; as long as none does, it is not asked.
         """
-        asked = self.setting.wrong_record is None or search.thorough in self.asked_for_records
-        if asked or found.rms < FAR_LESS * search.noise:
+        ask = self.setting.wrong_record
+        if ask is None or search.thorough in self.asked_for_records or found.rms < FAR_LESS * search.noise:
             return False
         few = [one for one in search.fitted.values() if 0 < len(one.effects) < MANY]
         variance = min(map(search.error, few), default=1.0) ** 2
@@ -151,8 +151,7 @@ class _Stage:
         # What many effects stand in for may be one of the few beside the record.
         hosts = [one for one, much in zip(models, better, strict=True) if much or one in likeliest]
         self.asked_for_records.add(search.thorough)
-        assert self.setting.wrong_record is not None
-        search.wrong_record = self.setting.wrong_record(hosts, found)
+        search.wrong_record = ask(hosts, found)
         return search.wrong_record is not None
 
     def _better_without_a_run(self, search: JointSearch, model: FittedModel) -> bool:
@@ -161,9 +160,8 @@ class _Stage:
         programs = [search.joint.ordered(one) for one in search.programs]
         fitting = [one for one in programs if set(model.effects) <= set(one)]
         program = min(fitting, key=len, default=model.effects)
-        joint = self.setting.joint(
-            self.setting.candidates
-        )  # values of presets are free beside a record that is corrected
+        # Values of presets are free beside a record that is corrected.
+        joint = self.setting.joint(self.setting.candidates)
         here = fitted_model(joint, model.effects, model.values, program)
         before, after = left_of_the_others(joint, here, search.error(model), program)
         if len(after) < 2:

@@ -161,8 +161,8 @@ def program(
     """`function(model, own)` compiled for models of this kind; `names` are those of the numbers that a run has of its own.
 
     `alone`: for one run at a time. `devices`: where XLA would run it; under "auto" anything but a processor is XLA's. `beside`: it is compiled beside
-    the caller, who waits for it at its first call, and may have others traced meanwhile. `quickly`: of a program that is run for less time than it takes to compile,
-    which takes half the time or less, and a run a tenth longer.
+    the caller, who waits for it at its first call, and may have others traced meanwhile. `quickly`: in half the time or less, of
+    a program that is not run for long: a run takes a tenth longer.
     Raises, under "native" alone, what stands in the way of machine code: Unsupported for what has no translation,
     ImportError without llvmlite, and whatever else goes wrong. What the function itself raises is always raised.
     """

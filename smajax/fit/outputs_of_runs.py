@@ -5,10 +5,10 @@ Each pair of a point and a direction is one run of a compiled program, in forwar
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import equinox as eqx
 import jax
@@ -17,13 +17,14 @@ import numpy as np
 
 from smajax.core.operating_system import available_cores
 from smajax.core.parameters import set_vector
-from smajax.engine import program
+from smajax.engine import Program, program
 from smajax.fit.packed_runs import predict_run
 from smajax.fit.problem import Problem
 from smajax.model.system import System
 from smajax.model.types import Series
 from smajax.simulation.steppers import Integration
 
+Function = Callable[[Any, Any], Any]
 Result = TypeVar("Result")
 MAX_BYTES = 2**28  # of predicted outputs at once: of long runs some points after the others
 SHORT = 1000  # samples of a run, up to which quick compiling saves more time than the runs of a fit then lose
@@ -63,11 +64,6 @@ def _runs(problem: Problem) -> list[_Run]:
     ]
 
 
-def _quickly(problem: Problem) -> bool:
-    """Whether its programs are compiled quickly: by what each of them is made for, the length of a run."""
-    return problem.batch.output.shape[-1] <= SHORT
-
-
 def _predict(run: _Run, values: jax.Array) -> jax.Array:
     """(outputs, N) at the values that all runs share, followed by those of this run."""
     count = len(run.shared)
@@ -89,6 +85,12 @@ def _at(run: _Run, scalars: dict[str, jax.Array]) -> jax.Array:
 def _along(run: _Run, scalars: dict[str, jax.Array]) -> tuple[jax.Array, jax.Array]:
     values, tangent = _vector(scalars, "value"), _vector(scalars, "tangent")
     return jax.jvp(lambda point: _predict(run, point), (values,), (tangent,))
+
+
+def _program(problem: Problem, function: Function, run: _Run, names: Iterable[str], beside: bool = False) -> Program:
+    """`function` of a run of the problem, compiled quickly or not by what it is made for, the length of a run."""
+    quickly = problem.batch.output.shape[-1] <= SHORT
+    return program(function, run, tuple(names), beside=beside, quickly=quickly)
 
 
 def _columns(kind: str, rows: np.ndarray) -> dict[str, np.ndarray]:
@@ -120,7 +122,7 @@ def predicted_at(problem: Problem, points: Sequence[np.ndarray] | np.ndarray) ->
     outputs = []
     for number, run in enumerate(_runs(problem)):
         scalars = _columns("value", _of_run(problem, rows, number))
-        outputs.append(program(_at, run, tuple(scalars), quickly=_quickly(problem))(run, scalars))
+        outputs.append(_program(problem, _at, run, scalars)(run, scalars))
     return np.concatenate(outputs, axis=1)
 
 
@@ -152,8 +154,8 @@ def made_ready(problems: Sequence[Problem]) -> None:
         nothing = np.zeros((1, len(problem.names)))
         for number, run in enumerate(_runs(problem)):
             at = _of_run(problem, nothing, number)
-            names = tuple({**_columns("value", at), **_columns("tangent", at)})
-            begun.append(program(_along, run, names, beside=True, quickly=_quickly(problem)))
+            names = {**_columns("value", at), **_columns("tangent", at)}
+            begun.append(_program(problem, _along, run, names, beside=True))
     for one in begun:
         one.wait()
 
@@ -173,9 +175,7 @@ def predicted_and_derivatives(
     for number, run in enumerate(_runs(problem)):
         at, along = (_of_run(problem, part, number) for part in pairs)
         scalars = {**_columns("value", at), **_columns("tangent", along)}
-        calls.append(
-            partial(program(_along, run, tuple(scalars), quickly=_quickly(problem)), run, scalars)
-        )  # and the number of threads
+        calls.append(partial(_program(problem, _along, run, scalars), run, scalars))  # and the number of threads
     results = _side_by_side(calls)
     values = [value[::directions] for value, _ in results]
     derivatives = [derivative.reshape(count, directions, *derivative.shape[1:]) for _, derivative in results]

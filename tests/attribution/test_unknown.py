@@ -21,7 +21,7 @@ from smajax.attribution.formulas import formulas
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.unknown.ranges import Sought
 from smajax.attribution.unknown.search import Lacking, _explains, in_place_of, unknown_terms
-from smajax.attribution.unknown.spline import COUNT, WAVES, design, powers, spline
+from smajax.attribution.unknown.spline import COUNT, WAVES, design, powers_of, spline
 from smajax.attribution.unknown.term_fits import with_terms
 from smajax.attribution.unknown.terms import UNKNOWN
 from smajax.core.parameters import parameters
@@ -132,7 +132,7 @@ def test_the_spline_equals_de_boors() -> None:
     share = np.linspace(0.0, 1.0, 101)
     expected = BSpline(knots, WAVES @ coefficients, 3)(share)
     np.testing.assert_allclose(design(share) @ coefficients, expected, atol=1e-12)
-    found = spline(powers([jnp.asarray(one) for one in coefficients]), jnp.asarray([-0.5, *share, 2.0]))
+    found = spline(powers_of([jnp.asarray(one) for one in coefficients]), jnp.asarray([-0.5, *share, 2.0]))
     np.testing.assert_allclose(found, [expected[0], *expected, expected[-1]], atol=1e-12)
 
 

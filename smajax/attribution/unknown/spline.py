@@ -52,7 +52,7 @@ WAVES = _waves()
 POWERS = _powers() @ WAVES
 
 
-def powers(coefficients: Sequence[Scalar]) -> list[Scalar]:
+def powers_of(coefficients: Sequence[Scalar]) -> list[Scalar]:
     """The function's c_0 to c_3 and d_1, d_2, ... of `_powers`, from the sizes of its waves, the constant's first; those of a constant are zero but for that."""
     weighed = ([float(weight) * one for weight, one in zip(row, coefficients, strict=True)] for row in POWERS)
     return [reduce(operator.add, row) for row in weighed]

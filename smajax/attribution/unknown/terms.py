@@ -12,7 +12,7 @@ from typing import ClassVar, Self
 import equinox as eqx
 import jax.numpy as jnp
 
-from smajax.attribution.unknown.spline import COUNT, powers, spline
+from smajax.attribution.unknown.spline import COUNT, powers_of, spline
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
 from smajax.model.effects.candidate import Candidate, Equation
@@ -75,7 +75,7 @@ class AbstractUnknown(AbstractEffect):
         return dataclasses.replace(self, powers=self._powers())
 
     def _powers(self) -> tuple[Scalar, ...]:
-        return tuple(self.scale * one for one in powers([getattr(self, name) for name in COEFFICIENTS]))
+        return tuple(self.scale * one for one in powers_of([getattr(self, name) for name in COEFFICIENTS]))
 
     def value(self, x: Scalar) -> Scalar:
         """f(x)."""
