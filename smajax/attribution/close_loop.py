@@ -13,25 +13,21 @@ from pathlib import Path
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.attribution.assumed_parameters import assumed, expansion_not_given
-from smajax.attribution.averaged_prediction import Averaged, averaged, with_averages
+from smajax.attribution.assembled_findings import findings_of, known_so_far
 from smajax.attribution.config import AttributionConfig
-from smajax.attribution.confounders import confounders
 from smajax.attribution.context import Context, Interim, Outcome
 from smajax.attribution.declared_priors import of_unknowns
-from smajax.attribution.final_model_findings import effects_found, parameters_found, priors_found
 from smajax.attribution.findings import (
     Findings,
     NoiseWithoutRun,
     PredictsTooLittle,
     Rejected,
     Remaining,
-    Verdict,
 )
 from smajax.attribution.fitted_sets import JointSearch
-from smajax.attribution.held_out import Compared, compare, every_run, validated
-from smajax.attribution.input_of_run import FAR_LESS, as_fitted, corrected, record_error
-from smajax.attribution.job import effects_excluded, job_of
+from smajax.attribution.held_out import compare, validated
+from smajax.attribution.input_of_run import FAR_LESS, MOST_LEFT, corrected, record_error
+from smajax.attribution.job import job_of
 from smajax.attribution.joint_stage import (
     base_alone,
     likeliest_so_far,
@@ -44,12 +40,10 @@ from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.neutral_at_base import check_neutral
 from smajax.attribution.outlier_run import outlier_runs
-from smajax.attribution.record_error import FoundRecordError, RecordError
+from smajax.attribution.record_error import NO_RECORDS, CorrectedRecords, FoundRecordError, NotConfirmed
 from smajax.attribution.same_as_parameters import said_by_parameters
-from smajax.attribution.saved_model import fit_run_states, saved_model
-from smajax.attribution.step_size_check import finer_integration, integration_error_of
-from smajax.attribution.unknown.search import Lacking, in_place_of, unknown_terms
-from smajax.attribution.verdict import verdict_of
+from smajax.attribution.step_size_check import finer_integration
+from smajax.attribution.unknown.search import in_place_of
 from smajax.core.blas_threads import on_one_blas_thread
 from smajax.core.progress import Progress, Result, Stage, as_progress, quiet, report_warnings
 from smajax.core.provenance import made_with
@@ -64,7 +58,7 @@ SEED = 2004
 MOST_SEARCHES = 2  # the first, and again without what the held-out runs rejected
 MOST_RECORD_ERRORS = 2  # of single runs that are corrected: with more of them nothing is left that says which is right
 EVERY, RARELY = 60.0, 8.0  # s before the first page of a search that goes on; times what the last took before the next
-CHECKING, WRITING = "checking what these runs determine", "standard errors and pictures"
+CHECKING = "checking what these runs determine"
 
 
 @on_one_blas_thread
@@ -104,13 +98,7 @@ def close_loop(  # keywords, which a caller names one by one
     context = prepared(experiment, cache, as_progress(progress), seed, settings, interim)
     if interim is not None:
         interim(known_so_far(context, base_alone(context.setting, context.base), Remaining.SEARCH))
-    context, outcome = searched_finely(context)
-    while len(context.record_errors) < MOST_RECORD_ERRORS and (wrong := wrong_record(context, outcome)) is not None:
-        # All else is asked of the runs as they should have been recorded.
-        context.setting.progress(Result(wrong.error))
-        right, errors = corrected(context.job.experiment, wrong.error), (*context.record_errors, wrong.error)
-        context = prepared(right, cache, context.setting.progress, seed, settings, interim, record_errors=errors)
-        context, outcome = searched_finely(context, (outcome.search, wrong.beside))
+    context, outcome = with_records_corrected(context)
     if interim is not None and not context.setting.is_noise(outcome.final):
         interim(known_so_far(context, (outcome.search, outcome.base, outcome.final), Remaining.CHECKS))
     outcome, rejected = against_the_held_out_runs(context, outcome)
@@ -128,7 +116,7 @@ def prepared(  # the stage's inputs, each once
     config: AttributionConfig,
     interim: Interim | None = None,
     integration: Integration | None = None,
-    record_errors: tuple[RecordError, ...] = (),
+    records: CorrectedRecords = NO_RECORDS,
 ) -> Context:
     """The experiment as a problem, its base model fitted, and what its runs determine, from the Jacobian there."""
     job = job_of(experiment, integration)
@@ -153,7 +141,7 @@ def prepared(  # the stage's inputs, each once
     base = setting.base(start, seed)
     # It was chosen where the fit begins, at which the wire may not even move. Now, and not when the whole search has been made with it.
     if integration is None and (finer := finer_integration(setting, (), base.values)) is not None:
-        return prepared(experiment, cache, progress, seed, config, interim, finer, record_errors)
+        return prepared(experiment, cache, progress, seed, config, interim, finer, records)
     progress(Stage(CHECKING, 0.0))
     problem, index = setting.restricted(())
     at_fit = sensitivity(problem, base.values[np.asarray(index)], [*job.unknowns, *job.presets])
@@ -169,10 +157,12 @@ def prepared(  # the stage's inputs, each once
     )
     progress(Stage(CHECKING, 1.0))
     progress(Result(checks))
-    context = Context(job, setting, start, base, seed, checks, interim, record_errors)
+    context = Context(job, setting, start, base, seed, checks, interim, records)
     setting.after_round = None if interim is None else _now_and_then(context, interim)
-    if len(record_errors) < MOST_RECORD_ERRORS:
-        setting.wrong_record = partial(record_error, setting, runs=job.fit_runs, times_less=FAR_LESS)
+    if len(records.errors) < MOST_RECORD_ERRORS:
+        setting.wrong_record = partial(
+            record_error, setting, runs=job.fit_runs, times_less=FAR_LESS, on_trial=records.trials
+        )
     return context
 
 
@@ -189,6 +179,41 @@ def _now_and_then(context: Context, interim: Interim) -> Callable[[JointSearch, 
             cost = max(began - now, beside if isinstance(beside, float) else 0.0)
 
     return after_round
+
+
+def with_records_corrected(context: Context) -> tuple[Context, Outcome]:
+    """The search; where an input of a run was recorded wrongly, again with that run corrected. All else is asked of the runs as they should have been recorded.
+
+    One that is corrected on trial stands where the model found at the end leaves little more than noise. Otherwise the search is made again without.
+    """
+    first = context
+    context, outcome = searched_finely(context)
+    while len(context.records.errors) < MOST_RECORD_ERRORS and (wrong := wrong_record(context, outcome)) is not None:
+        context.setting.progress(Result(wrong))
+        before = context.records
+        records = CorrectedRecords((*before.errors, wrong.error), before.trials and not wrong.error.on_trial)
+        context = _again(context, corrected(context.job.experiment, wrong.error), records)
+        context, outcome = searched_finely(context, (outcome.search, wrong.beside))
+    if not context.records.on_trial:
+        return context, outcome
+    if _leaves_little(context, outcome.final):
+        return replace(context, records=context.records.confirmed()), outcome
+    context.setting.progress(Result(NotConfirmed(context.records.errors)))
+    return with_records_corrected(_again(first, first.job.experiment, CorrectedRecords(trials=False)))
+
+
+def _again(context: Context, experiment: Experiment, records: CorrectedRecords) -> Context:
+    """The same from the beginning, for another `experiment`."""
+    setting = context.setting
+    return prepared(
+        experiment, setting.cache, setting.progress, context.seed, setting.config, context.interim, records=records
+    )
+
+
+def _leaves_little(context: Context, model: Model) -> bool:
+    """Whether a model leaves no more of the fit runs than one with a wrong record may."""
+    samples = float(np.asarray(context.job.problem.batch.mask).sum())
+    return float(np.sqrt(model.cost / samples)) < MOST_LEFT
 
 
 def searched_finely(
@@ -209,7 +234,7 @@ def searched_finely(
     if finer is None:
         return context, outcome
     given = context.job.experiment, setting.cache, setting.progress, context.seed, setting.config, context.interim
-    context = prepared(*given, finer, context.record_errors)
+    context = prepared(*given, finer, context.records)
     context.setting.rounds += setting.rounds
     return context, Outcome(*search_again(context.setting, context.base, outcome.search))
 
@@ -221,7 +246,8 @@ def wrong_record(context: Context, outcome: Outcome) -> FoundRecordError | None:
         return outcome.search.wrong_record
     if not final.effects and setting.is_noise(final):
         return None
-    return record_error(setting, [base, final] if final.effects else [base], final, context.job.fit_runs)
+    hosts = [base, final] if final.effects else [base]
+    return record_error(setting, hosts, final, context.job.fit_runs, on_trial=context.records.trials)
 
 
 def against_the_held_out_runs(context: Context, outcome: Outcome) -> tuple[Outcome, tuple[Rejected, ...]]:
@@ -274,110 +300,6 @@ def against_an_outlier_run(context: Context, outcome: Outcome) -> Outcome:
         return replace(outcome, outliers=outlier_runs(setting, final, names) or outcome.outliers)
     setting.set_aside(final, NoiseWithoutRun(outcome.outliers[0].run))
     return replace(outcome, final=base, lacking=None)
-
-
-def unknown_terms_of(context: Context, outcome: Outcome, verdict: Verdict) -> tuple[Lacking, tuple[str, ...]]:
-    """(unknown terms, effects that they supersede): sought where something is missing that is in all runs."""
-    setting, lacking = context.setting, outcome.lacking
-    if lacking is None:
-        missing = verdict in (Verdict.PARTLY_EXPLAINED, Verdict.NOT_IN_LIBRARY) and not outcome.one_outlier
-        lacking = unknown_terms(setting, outcome.final) if missing else Lacking()
-    left_out = lacking.terms[0].left_out_after if lacking.terms else None
-    if left_out is not None and not setting.predicts(left_out):
-        return Lacking(), ()
-    return lacking, outcome.superseded
-
-
-def known_so_far(context: Context, models: tuple[JointSearch, Model, Model], remaining: Remaining) -> Findings:
-    """What an attribution that goes on knows by then, as findings without a verdict. `models`: the search, base model, likeliest model."""
-    search, base, final = models
-    outcome = Outcome(search, base, final, Lacking())
-    found = findings_of(context, outcome, compare(context.job, context.setting, base, final), brief=True)
-    base_model, extended_model = (
-        None if one is None else replace(one, unfinished=remaining.value)
-        for one in (found.base_model, found.extended_model)
-    )
-    return replace(
-        found,
-        verdict=Verdict.NOT_FINISHED,
-        remaining=remaining,
-        base_model=base_model,
-        extended_model=extended_model,
-    )
-
-
-def findings_of(
-    context: Context, outcome: Outcome, compared: Compared, rejected: tuple[Rejected, ...] = (), brief: bool = False
-) -> Findings:
-    """The record of all stages. `brief`: without what takes long, the scores of effects that were not added, the confounders and the averages."""
-    job, setting, experiment = context.job, context.setting, context.job.experiment
-    base, final = outcome.base, outcome.final
-    runs, residual_before, residual_after = compared
-    setting.progress(Stage(WRITING, 0.0))
-    error_of = outcome.search.error_of
-    before = parameters_found(job, setting, base, context.start, error_of(()))
-    after = parameters_found(job, setting, final, context.start, error_of(final.effects)) if final.effects else before
-    effects = effects_found(job, setting, final, after, outcome.search.detectable or None, scored=not brief)
-    average = Averaged()
-    if len(job.fit_runs) > 1 and not brief:  # else none can be left out, which the band is made of
-        clocks = {run.name: len(run.time) for run in experiment.runs}
-        average = averaged(setting, outcome.search, final, every_run(job), base, clocks)
-        runs = with_averages(runs, average.runs)
-    states = {run.name: run.states for run in runs}
-    extended_model = base_model = saved_model(job, setting, outcome.search, final, after, average, states)
-    if final.effects:
-        states = fit_run_states(job, setting, base)
-        base_model = saved_model(job, setting, outcome.search, base, before, None, states)
-    mistaken = () if brief else confounders(outcome.search, setting, final, job.fit_runs)
-    setting.progress(Stage(WRITING, 1.0))
-    verdict = verdict_of(final.effects, residual_after, setting.config)
-    lacking, superseded = unknown_terms_of(context, outcome, verdict)
-    return Findings(
-        experiment=experiment.name,
-        title=experiment.title,
-        source=experiment.path.name,
-        verdict=verdict,
-        warnings=experiment.warnings,
-        checks=context.checks,
-        output_name=experiment.output_name,
-        output_unit=experiment.output_unit,
-        noise_sigma=experiment.noise_sigma,
-        noise_how=experiment.noise_how,
-        runs=runs,
-        before=before.parameters,
-        after=after.parameters,
-        effects=effects,
-        residual_before=residual_before,
-        residual_after=residual_after,
-        rounds=tuple(setting.rounds),
-        explained_variance=setting.explained_variance(final.left_out_rmse),
-        step=experiment.step,
-        integration=integration_error_of(setting, final),
-        offset=experiment.offset,
-        wire=experiment.wire,
-        load=experiment.load,
-        declared=tuple(experiment.parameters),
-        assumed=assumed(job, setting.presets),
-        priors=priors_found(job, setting),
-        preset_expansion=expansion_not_given(
-            job, {one.name: one.value for one in after.parameters if one.name in setting.presets}
-        ),
-        averaged=average.models,
-        dropped=average.dropped,
-        correlated=after.uncertainty.correlated_groups,
-        confounders=mistaken,
-        superseded=superseded,
-        rejected=rejected,
-        record_errors=tuple(
-            as_fitted(one, (after if final.effects else before).parameters) for one in context.record_errors
-        ),
-        unknown=lacking.terms,
-        outlier_runs=outcome.outliers,
-        config=setting.config,
-        effects_excluded=effects_excluded(experiment),
-        base_model=base_model,
-        extended_model=extended_model,
-    )
 
 
 def _provenance(experiment: Experiment, cache: ResultCache, command: str, seed: int, seconds: float) -> dict[str, str]:

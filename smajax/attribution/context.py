@@ -11,7 +11,7 @@ from smajax.attribution.findings import Findings
 from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.job import Job
 from smajax.attribution.model_fits import Model, Search
-from smajax.attribution.record_error import OutlierRun, RecordError
+from smajax.attribution.record_error import NO_RECORDS, CorrectedRecords, OutlierRun
 from smajax.attribution.unknown.search import Lacking
 from smajax.fit.identifiability import Checks
 from smajax.fit.levenberg_marquardt import Fit
@@ -30,7 +30,7 @@ class Context:
     seed: int
     checks: Checks
     interim: Interim | None
-    record_errors: tuple[RecordError, ...] = ()  # of the records of single runs, which are corrected in `job`
+    records: CorrectedRecords = NO_RECORDS  # of single runs, in `job`
 
 
 @dataclass(frozen=True)

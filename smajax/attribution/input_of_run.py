@@ -47,6 +47,9 @@ LEAST_ODDS = 3.0  # in log odds: twenty to one that the record is wrong, before 
 CLOSER = 3.0  # by which a fit is expected to come nearer: what its error is counted in while it runs
 MOST_LEFT = 2.0  # noises that the model with the error leaves: of one that leaves more no record is said to be wrong
 FAR_LESS = 4.0  # times that what the present model leaves before a search has ended: what is missing may be what it has not come to yet
+SHARE_OF_ONE = (
+    4.0  # times less than the base model that one value of one run leaves of all runs, to be corrected on trial
+)
 MOST_SHARES = (
     (4, 0.6),
     (8, 0.3),
@@ -92,39 +95,58 @@ class _EventParameters(JointParameters):
 
 
 def record_error(
-    setting: Search, hosts: Sequence[Host], present: Host, runs: Sequence[Run], times_less: float | None = None
+    setting: Search,
+    hosts: Sequence[Host],
+    present: Host,
+    runs: Sequence[Run],
+    times_less: float | None = None,
+    on_trial: bool = False,
 ) -> FoundRecordError | None:
     """The likeliest error of the record of one fit run, where it is likelier than `present` by `LEAST_ODDS`; `runs` of the fit, in order.
 
     It is sought beside each of `hosts`, in the place of all effects that `present` has beside theirs. `times_less`: by which the model with it leaves less at least; None: it may leave as much.
+    `on_trial`: one that leaves more than noise is given as well where it alone explains nearly all that the base model leaves: what is left may be a second one, and effects that are found beside it.
     """
     if len(runs) < LEAST_RUNS:
         return None
-    fits = [(host, *one) for host in hosts for one in _fits(setting, host, [run.name for run in runs])]
+    fits = [one for host in hosts for one in _fits(setting, host, [run.name for run in runs])]
     if not fits:
         return None
     joint = setting.joint(setting.candidates)
     here = fitted_model(joint, present.effects, present.values, present.effects)
-    best = min([here, *(model for *_, model in fits)], key=lambda model: model.rms)
+    best = min([here, *(one.model for one in fits)], key=lambda model: model.rms)
     error = independent_error(best, float(setting.problem.noise_sigma), setting.noise_given)
-    host, event, model = max(fits, key=lambda one: one[2].log_evidence(error**2))
-    ahead = model.log_evidence(error**2) - here.log_evidence(error**2)
-    too_much = model.rms > MOST_LEFT * float(setting.problem.noise_sigma)
-    too_near = times_less is not None and model.rms > here.rms / times_less
-    if ahead < LEAST_ODDS or too_much or too_near:
-        return None
-    run = next(one for one in runs if one.name == event.run)
-    found = RecordError(
-        run.name,
-        _channel(setting.problem.system, event.coefficient, run),
-        event.coefficient,
-        event.value,
-        model.standard_errors(error**2)[event.name],
-        ahead,
-        tuple(effect for effect in present.effects if effect not in host.effects),
-        float(run.time[-1] - run.time[0]),
+    much = MOST_LEFT * float(setting.problem.noise_sigma)
+
+    def likeliest(of: Sequence[_Fit]) -> _Fit | None:
+        likelier = max(of, key=lambda one: one.model.log_evidence(error**2), default=None)
+        if likelier is None or likelier.model.log_evidence(error**2) - here.log_evidence(error**2) < LEAST_ODDS:
+            return None
+        return likelier
+
+    found = likeliest(fits)
+    tried = (
+        found is None or found.model.rms > much or (times_less is not None and found.model.rms > here.rms / times_less)
     )
-    return FoundRecordError(found, host.effects)
+    if tried:
+        found = likeliest([one for one in fits if not one.host.effects]) if on_trial else None
+        if found is None or found.model.rms > found.before / SHARE_OF_ONE:
+            return None
+    assert found is not None
+    ahead = found.model.log_evidence(error**2) - here.log_evidence(error**2)
+    run = next(one for one in runs if one.name == found.event.run)
+    wrong = RecordError(
+        run.name,
+        _channel(setting.problem.system, found.event.coefficient, run),
+        found.event.coefficient,
+        found.event.value,
+        found.model.standard_errors(error**2)[found.event.name],
+        ahead,
+        tuple(effect for effect in present.effects if effect not in found.host.effects),
+        float(run.time[-1] - run.time[0]),
+        tried,
+    )
+    return FoundRecordError(wrong, found.host.effects)
 
 
 class _Event(NamedTuple):
@@ -137,7 +159,16 @@ class _Event(NamedTuple):
         return f"{self.coefficient}[{self.run}]"
 
 
-def _fits(setting: Search, host: Host, runs: Sequence[str]) -> list[tuple[_Event, FittedModel]]:
+class _Fit(NamedTuple):
+    """One error of a record beside one host. `before`: what the host leaves without it, root mean square, SI."""
+
+    host: Host
+    event: _Event
+    model: FittedModel
+    before: float
+
+
+def _fits(setting: Search, host: Host, runs: Sequence[str]) -> list[_Fit]:
     """`host` with each kind of error in each of the runs without which it leaves least of the others, fitted."""
     own, slots = setting.restricted(host.effects)
     system = own.system_at(jnp.asarray(host.values[slots]))
@@ -145,8 +176,8 @@ def _fits(setting: Search, host: Host, runs: Sequence[str]) -> list[tuple[_Event
     if not kinds:
         return []
     whole = with_effects(system, [kind.coefficient.split(".")[0] for kind in kinds])
-    before = own.per_run_at(jnp.asarray(host.values[slots]))
-    start = jnp.concatenate([before, jnp.zeros((len(runs), len(kinds)))], axis=1)
+    as_it_was = own.per_run_at(jnp.asarray(host.values[slots]))
+    start = jnp.concatenate([as_it_was, jnp.zeros((len(runs), len(kinds)))], axis=1)
     names = (*own.per_run.names, *(kind.coefficient for kind in kinds))
     per_run = PerRun(names, tuple(runs), start, own.per_run.single)
     problem = own.with_system(whole, per_run=per_run)
@@ -173,10 +204,13 @@ def _fits(setting: Search, host: Host, runs: Sequence[str]) -> list[tuple[_Event
     excess = tuple((steps, max(share * squares, allowed)) for steps, share in MOST_SHARES)
     settings = replace(settings, allowed_excess=excess, least_cost=0.0, promised_excess=None, one_of_each=0)
     fits = levenberg_marquardt(joint_problem, tasks, settings)
+    before = float(np.sqrt((left**2).sum() / np.asarray(own.batch.mask).sum()))
     return [
-        (
+        _Fit(
+            host,
             _Event(kind.coefficient, run, float(fit.values[joint.slots[name]])),
             fitted_model(joint, (*host.effects, name), fit.values, ()),
+            before,
         )
         for (name, (kind, run)), fit in zip(events.items(), fits, strict=True)
     ]

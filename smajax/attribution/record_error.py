@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 
@@ -18,6 +18,7 @@ class RecordError:
     log_odds: float  # over the model that it takes the place of, or stands beside
     instead_of: tuple[str, ...]  # effects that the search had named in its place
     seconds: float  # length of the run
+    on_trial: bool = False  # more than noise is left with it; it stands if the search beside it comes down to noise
 
 
 class FoundRecordError(NamedTuple):
@@ -25,6 +26,33 @@ class FoundRecordError(NamedTuple):
 
     error: RecordError
     beside: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class CorrectedRecords:
+    """Records of single runs that are corrected in an experiment. `trials`: whether one may be on trial."""
+
+    errors: tuple[RecordError, ...] = ()
+    trials: bool = True
+
+    @property
+    def on_trial(self) -> bool:
+        """Whether one of them is."""
+        return any(one.on_trial for one in self.errors)
+
+    def confirmed(self) -> CorrectedRecords:
+        """The same, none of them on trial any more."""
+        return replace(self, errors=tuple(replace(one, on_trial=False) for one in self.errors))
+
+
+NO_RECORDS = CorrectedRecords()
+
+
+@dataclass(frozen=True)
+class NotConfirmed:
+    """Records that were corrected on trial, beside which no model came down to noise; they are taken as they were logged again."""
+
+    errors: tuple[RecordError, ...]
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from importlib import resources
+from importlib import import_module, resources
+from types import SimpleNamespace
+from typing import Any, cast
 
 import jax
 import jax.numpy as jnp
@@ -12,22 +14,31 @@ import numpy as np
 import pytest
 
 from smajax.attribution.close_loop import close_loop
+from smajax.attribution.context import Context, Outcome
 from smajax.attribution.findings import Findings
 from smajax.attribution.input_of_run import FAR_LESS, corrected, record_error
 from smajax.attribution.laplace_evidence import fitted_model
 from smajax.attribution.leave_one_run_out import left_of_the_others
 from smajax.attribution.model_fits import Model, Search, Start
-from smajax.attribution.record_error import RecordError
+from smajax.attribution.record_error import (
+    NO_RECORDS,
+    CorrectedRecords,
+    FoundRecordError,
+    NotConfirmed,
+    RecordError,
+)
+from smajax.core.progress import Result
 from smajax.core.result_cache import ResultCache
 from smajax.data.experiment.load import load_experiment
 from smajax.data.experiment.record import Experiment, Run
 from smajax.data.model_catalogue import CATALOGUE
 from smajax.fit.base_model import base_model
 from smajax.fit.experiment_problem import free_by_name, own_values
-from smajax.report.narrative.record_errors import of_wrong_records, what_was_wrong
+from smajax.report.narrative.record_errors import of_wrong_records, what_is_searched, what_was_wrong
 from tests.helpers.hot_weight import DT, SAMPLES, UNKNOWNS, hot_weight
 from tests.helpers.made_findings import made_findings
 
+loop = import_module("smajax.attribution.close_loop")
 NAMES = ("first", "second", "third", "fourth")
 
 
@@ -107,6 +118,73 @@ def test_no_record_is_wrong_where_more_is_missing() -> None:
     assert record_error(dataclasses.replace(setting, problem=problem), (base, extended), extended, runs) is None
 
 
+def _twice_wrong(truth: dict[str, float]) -> tuple[Search, Model, Model, list[Run]]:
+    """One run at a level that was noted a tenth too high, another 0.6 s early."""
+    setting, _, _, runs = _searched(truth, lambda volts: volts / 0.9, 2)
+    batch = setting.problem.batch
+    volts = batch.inputs["voltage"]
+    volts = volts.at[0].set(_early(volts[0]))
+    problem = dataclasses.replace(setting.problem, batch=dataclasses.replace(batch, inputs={"voltage": volts}))
+    setting = dataclasses.replace(setting, problem=problem)
+    (fit,), _ = setting.fit([Start((), problem.start_values())], "a fit", settled=1e-3)
+    base = Model((), fit.values, fit.cost, np.zeros(volts.shape), 0.0)
+    return setting, base, base, runs
+
+
+def test_the_greater_of_two_wrong_records_is_corrected_on_trial() -> None:
+    """With it more than noise is left, by the other one; beside it that is found."""
+    setting, base, _, runs = _twice_wrong({})
+    assert record_error(setting, (base,), base, runs) is None
+    found = record_error(setting, (base,), base, runs, on_trial=True)
+    assert found is not None
+    assert found.error.on_trial
+    assert found.beside == ()
+    assert found.error.run in NAMES[:3:2]
+
+
+@pytest.mark.parametrize("left", [1.0, 5.0])
+def test_a_record_on_trial_stands_where_the_search_beside_it_comes_down_to_noise(
+    monkeypatch: pytest.MonkeyPatch, left: float
+) -> None:
+    """And if it does not, the search is made once more with the runs as they were logged, and none on trial."""
+    experiment = _demo("complete")
+    tried = dataclasses.replace(FOUND, on_trial=True)
+    said: list[object] = []
+    asked: list[tuple[int, bool]] = []
+    problem = hot_weight({}).joint.problem
+    samples = float(np.asarray(problem.batch.mask).sum())
+
+    def context(experiment: Experiment, *_: object, records: CorrectedRecords = NO_RECORDS) -> Context:
+        job = SimpleNamespace(experiment=experiment, problem=problem)
+        setting = SimpleNamespace(cache=None, progress=said.append, config=None)
+        return Context(
+            cast(Any, job), cast(Any, setting), np.zeros(1), cast(Any, None), 1, cast(Any, None), None, records
+        )
+
+    def searched(context: Context, *_: object) -> tuple[Context, Outcome]:
+        asked.append((len(context.records.errors), context.records.trials))
+        noises = left if context.records.errors else 50.0
+        model = Model((), np.zeros(1), samples * noises**2, np.zeros((1, 1)), 0.0)
+        return context, Outcome(cast(Any, None), model, model)
+
+    def wrong(context: Context, _: Outcome) -> FoundRecordError | None:
+        return FoundRecordError(tried, ()) if context.records.trials else None
+
+    for name, instead in (("prepared", context), ("searched_finely", searched), ("wrong_record", wrong)):
+        monkeypatch.setattr(loop, name, instead)
+    final, _ = loop.with_records_corrected(context(experiment))
+    records = [one.record for one in said if isinstance(one, Result)]
+    if left < 2.0:
+        assert final.records.errors == (dataclasses.replace(tried, on_trial=False),)
+        assert asked == [(0, True), (1, False)]
+    else:
+        assert final.records.errors == ()
+        assert final.job.experiment is experiment
+        assert asked == [(0, True), (1, False), (0, False)]
+        assert "as they were logged" in what_is_searched(cast(NotConfirmed, records[-1]))
+    assert what_is_searched(cast(FoundRecordError, records[0])).endswith("on trial: more than noise is left")
+
+
 def test_before_a_search_has_ended_the_model_with_the_error_has_to_leave_far_less() -> None:
     setting, base, extended, runs = _searched({}, _early, 0)
     assert record_error(setting, (base, extended), extended, runs, FAR_LESS) is not None
@@ -163,6 +241,9 @@ def test_the_page_says_what_the_record_should_have_been() -> None:
     (said,) = of_wrong_records(findings)
     assert "the recorded voltage of steps is 0.8000 ± 0.0010 s early: what it shows acted so much later" in said
     assert "Without that the search names draught in its place." in said
+    tried = dataclasses.replace(findings, record_errors=(dataclasses.replace(FOUND, on_trial=True),))
+    (said,) = of_wrong_records(tried)  # of a search that was ended by the user
+    assert said.startswith("An input of one run may not be right: the recorded voltage of steps")
     clock = dataclasses.replace(FOUND, coefficient="input_clock.rate", value=-0.01, standard_error=1e-3)
     assert what_was_wrong(clock).endswith("right at its start, and 0.600 ± 0.060 s late at its end")
     load = dataclasses.replace(FOUND, channel="mass", coefficient="wrong_load.share", value=-0.1, standard_error=2e-3)

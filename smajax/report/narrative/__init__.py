@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, overload
 
 from smajax.attribution.findings import Findings, Round
-from smajax.attribution.record_error import RecordError
+from smajax.attribution.record_error import FoundRecordError, NotConfirmed
 from smajax.core.progress import Event, Message, Progress, Result
 from smajax.fit.identifiability import Checks
 from smajax.fit.identify_result import Identified
@@ -23,7 +23,7 @@ from smajax.report.identifiability_words import check_events, check_sentences
 from smajax.report.narrative.identification import IdentificationNarrative, of_identified
 from smajax.report.narrative.limits import cannot_know
 from smajax.report.narrative.priors import of_priors
-from smajax.report.narrative.record_errors import what_was_wrong
+from smajax.report.narrative.record_errors import what_is_searched
 from smajax.report.narrative.residual import residual_sentences, unexplained
 from smajax.report.narrative.rounds import chosen_text, reason_text
 from smajax.report.narrative.unknown import comparison_sentence
@@ -106,8 +106,8 @@ def narrated(progress: Progress, unit: str = "-", quantity: str = "") -> Progres
         elif isinstance(event, Result) and isinstance(event.record, Checks):
             for one in check_events(event.record):
                 progress(one)
-        elif isinstance(event, Result) and isinstance(event.record, RecordError):
-            progress(Message(f"{what_was_wrong(event.record)}; the search begins again with that run corrected"))
+        elif isinstance(event, Result) and isinstance(event.record, FoundRecordError | NotConfirmed):
+            progress(Message(what_is_searched(event.record)))
         else:
             progress(event)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from smajax.attribution.findings import Findings
-from smajax.attribution.record_error import RecordError
+from smajax.attribution.record_error import FoundRecordError, NotConfirmed, RecordError
 from smajax.core.display_units import with_error
 from smajax.core.wording import and_listed
 
@@ -14,10 +14,25 @@ def of_wrong_records(findings: Findings) -> Iterator[str]:
     """What was recorded wrongly, that the run was corrected by it, and what it takes the place of."""
     for one in findings.record_errors:
         instead = f" Without that the search names {and_listed(one.instead_of)} in its place." if one.instead_of else ""
+        if one.on_trial:
+            yield (
+                f"An input of one run may not be right: {what_was_wrong(one)}. It is corrected by that on trial, and stands if what is found beside it leaves "
+                "little more than noise."
+            )
+            continue
         yield (
             f"An input of one run cannot be right: {what_was_wrong(one)}. It is corrected by that here and everything else is said of the corrected "
             f"run; look at its log, and correct it or leave the run out.{instead}"
         )
+
+
+def what_is_searched(one: FoundRecordError | NotConfirmed) -> str:
+    """Why the search begins again: with a record corrected, or with those that were corrected on trial as they were logged."""
+    if isinstance(one, NotConfirmed):
+        names = and_listed([f"{wrong.channel} of {wrong.run}" for wrong in one.errors])
+        return f"the {names} as corrected leaves more than noise; the search begins again with all runs as they were logged"
+    again = f"{what_was_wrong(one.error)}; the search begins again with that run corrected"
+    return f"{again}, on trial: more than noise is left" if one.error.on_trial else again
 
 
 def what_was_wrong(one: RecordError) -> str:
