@@ -7,7 +7,7 @@ import time as clock
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
+from functools import partial, reduce
 from pathlib import Path
 
 import jax.numpy as jnp
@@ -26,7 +26,7 @@ from smajax.attribution.findings import (
 )
 from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.held_out import compare, validated
-from smajax.attribution.input_of_run import FAR_LESS, MOST_LEFT, corrected, record_error
+from smajax.attribution.input_of_run import FAR_LESS, corrected, record_errors
 from smajax.attribution.job import job_of
 from smajax.attribution.joint_stage import (
     base_alone,
@@ -40,7 +40,8 @@ from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.neutral_at_base import check_neutral
 from smajax.attribution.outlier_run import outlier_runs
-from smajax.attribution.record_error import NO_RECORDS, CorrectedRecords, FoundRecordError, NotConfirmed
+from smajax.attribution.record_error import NO_RECORDS, CorrectedRecords, FoundRecordErrors, NotConfirmed
+from smajax.attribution.record_fits import MOST_LEFT
 from smajax.attribution.same_as_parameters import said_by_parameters
 from smajax.attribution.step_size_check import finer_integration
 from smajax.attribution.unknown.search import in_place_of
@@ -161,7 +162,7 @@ def prepared(  # the stage's inputs, each once
     setting.after_round = None if interim is None else _now_and_then(context, interim)
     if len(records.errors) < MOST_RECORD_ERRORS:
         setting.wrong_record = partial(
-            record_error, setting, runs=job.fit_runs, times_less=FAR_LESS, on_trial=records.trials
+            record_errors, setting, runs=job.fit_runs, times_less=FAR_LESS, on_trial=records.may_try
         )
     return context
 
@@ -190,9 +191,8 @@ def with_records_corrected(context: Context) -> tuple[Context, Outcome]:
     context, outcome = searched_finely(context)
     while len(context.records.errors) < MOST_RECORD_ERRORS and (wrong := wrong_record(context, outcome)) is not None:
         context.setting.progress(Result(wrong))
-        before = context.records
-        records = CorrectedRecords((*before.errors, wrong.error), before.trials and not wrong.error.on_trial)
-        context = _again(context, corrected(context.job.experiment, wrong.error), records)
+        records = replace(context.records, errors=(*context.records.errors, *wrong.errors))
+        context = _again(context, reduce(corrected, wrong.errors, context.job.experiment), records)
         context, outcome = searched_finely(context, (outcome.search, wrong.beside))
     if not context.records.on_trial:
         return context, outcome
@@ -239,7 +239,7 @@ def searched_finely(
     return context, Outcome(*search_again(context.setting, context.base, outcome.search))
 
 
-def wrong_record(context: Context, outcome: Outcome) -> FoundRecordError | None:
+def wrong_record(context: Context, outcome: Outcome) -> FoundRecordErrors | None:
     """An input of one run that was recorded wrongly; asked where something is missing, if the search has not found one."""
     setting, base, final = context.setting, outcome.base, outcome.final
     if outcome.search.wrong_record is not None:
@@ -247,7 +247,7 @@ def wrong_record(context: Context, outcome: Outcome) -> FoundRecordError | None:
     if not final.effects and setting.is_noise(final):
         return None
     hosts = [base, final] if final.effects else [base]
-    return record_error(setting, hosts, final, context.job.fit_runs, on_trial=context.records.trials)
+    return record_errors(setting, hosts, final, context.job.fit_runs, on_trial=context.records.may_try)
 
 
 def against_the_held_out_runs(context: Context, outcome: Outcome) -> tuple[Outcome, tuple[Rejected, ...]]:

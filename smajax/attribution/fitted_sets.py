@@ -9,7 +9,7 @@ import numpy as np
 
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.laplace_evidence import FittedModel, independent_error
-from smajax.attribution.record_error import FoundRecordError
+from smajax.attribution.record_error import FoundRecordErrors
 from smajax.attribution.unknown.search import AskedFor
 from smajax.fit.levenberg_marquardt import FitSettings
 from smajax.model.effects.candidate import Extent
@@ -42,7 +42,7 @@ class JointSearch:
     before_the_end: Callable[[FittedModel], FittedModel | None] = lambda _: None
     # Whether the record of one run is wrong where a model of many effects leaves many noises: the search ends, and is made again with it corrected.
     has_wrong_record: Callable[[FittedModel], bool] = lambda _: False
-    wrong_record: FoundRecordError | None = None
+    wrong_record: FoundRecordErrors | None = None
     lacking: AskedFor | None = None  # unknown terms beside the base model, where they were asked for
 
     def error(self, model: FittedModel) -> float:

@@ -11,6 +11,7 @@ from functools import partial
 
 import numpy as np
 
+from smajax.attribution.doubtful_runs import LEAST_RUNS_OF_TWO, left_without
 from smajax.attribution.exclusive_effects import replaceable
 from smajax.attribution.findings import LikelierModel, NoLikelierModel, Reason, Round, StepDependent
 from smajax.attribution.fitted_sets import JointRound, JointSearch
@@ -23,7 +24,6 @@ from smajax.attribution.joint_search import (
     search_jointly,
 )
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model
-from smajax.attribution.leave_one_run_out import left_of_the_others
 from smajax.attribution.model_fits import Evidence, Model, Search
 from smajax.attribution.optimum import as_model, final_model, refined, with_no_effect_too_many
 from smajax.attribution.same_as_parameters import said_by_parameters
@@ -36,9 +36,6 @@ from smajax.model.effects.library import LIBRARY
 from smajax.model.effects.prior_width import CoefficientPrior
 
 LIKELIEST = 4  # sets of effects from which the search goes on with the values of presets free
-LEFT_WITHOUT_A_RUN = 0.3  # of the error on the other runs: of these a wrong record of one run explains most
-NEAR_NOISE = 1.5  # noises
-BESIDE_OTHERS = 0.5  # of what is left without the next run, which may be much where other effects are missing as well
 FREED_SHARE = 2.0 / 3.0  # of the base error, to which free values of presets lower it where the search begins so
 
 
@@ -145,7 +142,7 @@ class _Stage:
         variance = min(map(search.error, few), default=1.0) ** 2
         likeliest = sorted(few, key=lambda one: -one.log_evidence(variance))[:1]
         models = [search.fitted[()], *likeliest, found]
-        better = [self._better_without_a_run(search, one) for one in models]
+        better = [self._better_without_runs(search, one) for one in models]
         if not any(better):
             return False
         # What many effects stand in for may be one of the few beside the record.
@@ -154,21 +151,15 @@ class _Stage:
         search.wrong_record = ask(hosts, found)
         return search.wrong_record is not None
 
-    def _better_without_a_run(self, search: JointSearch, model: FittedModel) -> bool:
-        """Whether without one run next to noise is left of the others, or little of what is, or half of what is left without any other run."""
-        # Of those that are compiled the smallest; what an earlier search carried may be in the base model since.
+    def _better_without_runs(self, search: JointSearch, model: FittedModel) -> bool:
+        """Whether next to noise is left of the others without one run, or little of what is, or half of what is left without any other run; or so without two."""
+        # Of the programs that are compiled the smallest; what an earlier search carried may be in the base model since.
         programs = [search.joint.ordered(one) for one in search.programs]
         fitting = [one for one in programs if set(model.effects) <= set(one)]
         program = min(fitting, key=len, default=model.effects)
-        # Values of presets are free beside a record that is corrected.
-        joint = self.setting.joint(self.setting.candidates)
-        here = fitted_model(joint, model.effects, model.values, program)
-        before, after = left_of_the_others(joint, here, search.error(model), program)
-        if len(after) < 2:
-            return False
-        least, second, *_ = np.sort(after)
-        little = after < np.maximum(LEFT_WITHOUT_A_RUN * before, NEAR_NOISE * search.noise)
-        return bool(little.any() or least < BESIDE_OTHERS * second)
+        runs = self.setting.problem.batch.runs
+        most = 2 if runs >= LEAST_RUNS_OF_TWO and not model.effects else 1
+        return any(left_without(self.setting, model, count, program).stands_out for count in range(1, most + 1))
 
     def before_the_end(self, search: JointSearch, found: FittedModel) -> FittedModel | None:
         """One effect that is likelier than those of `found`, in an equation where an unknown function is likelier than these too."""

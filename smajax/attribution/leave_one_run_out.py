@@ -11,6 +11,7 @@ noise it is too long to be believed, and those fits are made.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -69,26 +70,27 @@ def left_out(joint: JointParameters, model: FittedModel, error: float, program: 
 
 
 def left_of_the_others(
-    joint: JointParameters, model: FittedModel, error: float, program: Sequence[str]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Root mean squares (runs,) of what `model` leaves of the other runs, and of what it would leave fitted to them alone, by one Gauss-Newton step; SI.
+    joint: JointParameters, model: FittedModel, error: float, program: Sequence[str], together: int = 1
+) -> tuple[list[tuple[int, ...]], np.ndarray, np.ndarray]:
+    """(runs that are left out, root mean squares of what `model` leaves of the others, and of what it would leave fitted to them alone, by one Gauss-Newton step).
 
-    `error` and `program` as of `left_out`.
+    Each run in turn, or each `together` runs. `error` and `program` as of `left_out`; SI.
     """
     problem, index = joint.restricted(program)
     problem = problem.with_noise(error)
     gram, gradient, misfit = _normal_equations(problem, model, model.values[index])
-    squares, samples = problem.by_run(misfit**2), problem.by_run(np.asarray(problem.batch.mask))
+    squares, samples = problem.by_run(misfit**2).sum(axis=1), problem.by_run(np.asarray(problem.batch.mask)).sum(axis=1)
+    groups = list(itertools.combinations(range(problem.batch.runs), together))
     before, after = [], []
-    for run in range(problem.batch.runs):
-        other = problem.owner != run
-        count = samples.sum() - samples[run].sum()
-        left = squares.sum() - squares[run].sum()
+    for gone in groups:
+        other = ~np.isin(problem.owner, gone)
+        stay = [run for run in range(problem.batch.runs) if run not in gone]
+        count, left = samples[stay].sum(), squares[stay].sum()
         others, slope = gram[other].sum(axis=0), gradient[other].sum(axis=0)
         step = np.linalg.solve(others + np.diag(model.precision), slope)
         before.append(left / count)
         after.append(max(left - 2.0 * float(step @ slope) + float(step @ others @ step), 0.0) / count)
-    return error * np.sqrt(before), error * np.sqrt(after)
+    return groups, error * np.sqrt(before), error * np.sqrt(after)
 
 
 def predicting(

@@ -19,7 +19,7 @@ from smajax.attribution.declared_priors import NONE_DECLARED
 from smajax.attribution.every_effect import EVERY
 from smajax.attribution.findings import Reason, Round
 from smajax.attribution.joint_parameters import JointParameters
-from smajax.attribution.record_error import FoundRecordError
+from smajax.attribution.record_error import FoundRecordErrors
 from smajax.attribution.residual_diagnostics import noise_by_output
 from smajax.attribution.run_extent import extent_of
 from smajax.attribution.score_test import switches
@@ -94,7 +94,7 @@ class Search:
     # Gets a joint search and its likeliest model (`FittedModel`) after each of its rounds.
     after_round: Callable[[Any, Any], object] | None = None
     # An input of one run that was recorded wrongly, beside some models, in the place of one that the search has come to; None: it is not asked for.
-    wrong_record: Callable[[Sequence[Any], Any], FoundRecordError | None] | None = None
+    wrong_record: Callable[[Sequence[Any], Any], FoundRecordErrors | None] | None = None
 
     def note(self, done: Round) -> None:
         """Record a round and report it."""

@@ -21,19 +21,24 @@ class RecordError:
     on_trial: bool = False  # more than noise is left with it; it stands if the search beside it comes down to noise
 
 
-class FoundRecordError(NamedTuple):
-    """A record's error, and the effects of the model that it was found beside."""
+class FoundRecordErrors(NamedTuple):
+    """Errors of one record, or of two on trial, and the effects of the model that they were found beside."""
 
-    error: RecordError
+    errors: tuple[RecordError, ...]
     beside: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class CorrectedRecords:
-    """Records of single runs that are corrected in an experiment. `trials`: whether one may be on trial."""
+    """Records of single runs that are corrected in an experiment. `trials`: whether some may be on trial."""
 
     errors: tuple[RecordError, ...] = ()
     trials: bool = True
+
+    @property
+    def may_try(self) -> bool:
+        """Whether the next may be on trial: only the first ones, and not where some did not stand it."""
+        return self.trials and not self.errors
 
     @property
     def on_trial(self) -> bool:

@@ -31,9 +31,10 @@ def free_by_name(experiment: Experiment, runs: Sequence[Run]) -> dict[str, Unkno
 def own_values(experiment: Experiment, runs: Sequence[Run]) -> PerRun:
     """The unknowns with one value for each of `runs`, at their start; of a run that has none, zero."""
     per_run = [unknown for unknown in experiment.unknowns if unknown.per_run]
-    start = [[one.start if one.of(run.name) else 0.0 for one in per_run] for run in runs]
-    single = tuple(unknown.name for unknown in per_run if unknown.runs is not None)
-    names = tuple(unknown.name for unknown in per_run)
+    names = tuple(dict.fromkeys(unknown.name for unknown in per_run))  # several may be of different runs
+    own = {(one.name, run.name): one.start for one in per_run for run in runs if one.of(run.name)}
+    start = [[own.get((name, run.name), 0.0) for name in names] for run in runs]
+    single = tuple(dict.fromkeys(unknown.name for unknown in per_run if unknown.runs is not None))
     whole = jnp.asarray(start, dtype=float).reshape(len(runs), len(names))
     return PerRun(names, tuple(run.name for run in runs), whole, single)
 

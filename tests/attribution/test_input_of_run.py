@@ -16,14 +16,14 @@ import pytest
 from smajax.attribution.close_loop import close_loop
 from smajax.attribution.context import Context, Outcome
 from smajax.attribution.findings import Findings
-from smajax.attribution.input_of_run import FAR_LESS, corrected, record_error
+from smajax.attribution.input_of_run import FAR_LESS, corrected, record_errors
 from smajax.attribution.laplace_evidence import fitted_model
 from smajax.attribution.leave_one_run_out import left_of_the_others
 from smajax.attribution.model_fits import Model, Search, Start
 from smajax.attribution.record_error import (
     NO_RECORDS,
     CorrectedRecords,
-    FoundRecordError,
+    FoundRecordErrors,
     NotConfirmed,
     RecordError,
 )
@@ -35,7 +35,7 @@ from smajax.data.model_catalogue import CATALOGUE
 from smajax.fit.base_model import base_model
 from smajax.fit.experiment_problem import free_by_name, own_values
 from smajax.report.narrative.record_errors import of_wrong_records, what_is_searched, what_was_wrong
-from tests.helpers.hot_weight import DT, SAMPLES, UNKNOWNS, hot_weight
+from tests.helpers.hot_weight import DT, SAMPLES, UNKNOWNS, VOLTS, hot_weight
 from tests.helpers.made_findings import made_findings
 
 loop = import_module("smajax.attribution.close_loop")
@@ -92,9 +92,9 @@ def test_a_wrong_record_is_named_with_its_run_and_size(
     truth: dict[str, float], wrong: Callable[[jax.Array], jax.Array], run: int, coefficient: str, value: float
 ) -> None:
     setting, base, extended, runs = _searched(truth, wrong, run)
-    asked = record_error(setting, (base, extended), extended, runs)
+    asked = record_errors(setting, (base, extended), extended, runs)
     assert asked is not None
-    found = asked.error
+    (found,) = asked.errors
     assert (found.run, found.channel, found.coefficient) == (NAMES[run], "voltage", coefficient)
     assert found.value == pytest.approx(value, abs=max(4.0 * found.standard_error, 1e-3 * abs(value)))
     # Where nothing else is missing the latent heat was a stand-in; where it is, it stays beside the record's error.
@@ -104,42 +104,59 @@ def test_a_wrong_record_is_named_with_its_run_and_size(
 
 def test_where_every_record_is_right_none_is_named() -> None:
     setting, base, extended, runs = _searched({"latent_heat.enthalpy": 1.2e4}, _early, None)
-    assert record_error(setting, (base, extended), extended, runs) is None
-    assert record_error(setting, (base,), base, runs[:2]) is None  # of two that disagree either may be wrong
+    assert record_errors(setting, (base, extended), extended, runs) is None
+    assert record_errors(setting, (base,), base, runs[:2]) is None  # of two that disagree either may be wrong
 
 
 @pytest.mark.slow
 def test_no_record_is_wrong_where_more_is_missing() -> None:
     """A sensor whose zero drifts in all runs, which nothing that is looked at explains: the error of the record would take its part of it."""
     setting, base, extended, runs = _searched({}, _early, 0)
-    assert record_error(setting, (base, extended), extended, runs) is not None
+    assert record_errors(setting, (base, extended), extended, runs) is not None
     drift = 20.0 * float(setting.problem.noise_sigma) * np.sin(np.linspace(0.0, 9.0, SAMPLES))
     problem = setting.problem.with_output(jnp.asarray(setting.problem.measured + drift))
-    assert record_error(dataclasses.replace(setting, problem=problem), (base, extended), extended, runs) is None
+    assert record_errors(dataclasses.replace(setting, problem=problem), (base, extended), extended, runs) is None
 
 
-def _twice_wrong(truth: dict[str, float]) -> tuple[Search, Model, Model, list[Run]]:
-    """One run at a level that was noted a tenth too high, another 0.6 s early."""
-    setting, _, _, runs = _searched(truth, lambda volts: volts / 0.9, 2)
-    batch = setting.problem.batch
+def _twice_wrong(second: Callable[[jax.Array], jax.Array]) -> tuple[Search, Model, list[Run]]:
+    """Six runs, the third at a level that was noted a tenth too high, and the first changed by `second`."""
+    joint = hot_weight({}, ("latent_heat",), steps=(*VOLTS, (7.5, 3.0), (8.5, 2.0))).joint
+    batch = joint.problem.batch
     volts = batch.inputs["voltage"]
-    volts = volts.at[0].set(_early(volts[0]))
-    problem = dataclasses.replace(setting.problem, batch=dataclasses.replace(batch, inputs={"voltage": volts}))
-    setting = dataclasses.replace(setting, problem=problem)
+    volts = volts.at[2].set(volts[2] / 0.9).at[0].set(second(volts[0]))
+    problem = dataclasses.replace(joint.problem, batch=dataclasses.replace(batch, inputs={"voltage": volts}))
+    setting = Search(problem, UNKNOWNS, joint.bounds, ("latent_heat",), ResultCache())
     (fit,), _ = setting.fit([Start((), problem.start_values())], "a fit", settled=1e-3)
-    base = Model((), fit.values, fit.cost, np.zeros(volts.shape), 0.0)
-    return setting, base, base, runs
+    time = np.asarray(DT * np.arange(SAMPLES), dtype=np.float64)
+    runs = [
+        Run(f"run {k}", "fit", time, {"voltage": np.asarray(one)}, {"position": problem.measured[k]}, {}, (), "")
+        for k, one in enumerate(volts)
+    ]
+    return setting, Model((), fit.values, fit.cost, np.zeros(volts.shape), 0.0), runs
 
 
-def test_the_greater_of_two_wrong_records_is_corrected_on_trial() -> None:
-    """With it more than noise is left, by the other one; beside it that is found."""
-    setting, base, _, runs = _twice_wrong({})
-    assert record_error(setting, (base,), base, runs) is None
-    found = record_error(setting, (base,), base, runs, on_trial=True)
+@pytest.mark.parametrize(
+    ("second", "coefficient", "value"),
+    [
+        (_early, "input_delay.delay", 0.6),
+        pytest.param(lambda volts: volts / 1.08, "input_level.gain", 0.08, marks=pytest.mark.slow),
+    ],
+    ids=["recorded early", "noted too low"],
+)
+def test_records_that_are_wrong_in_two_runs_are_named_together(
+    second: Callable[[jax.Array], jax.Array], coefficient: str, value: float
+) -> None:
+    """With either corrected much is left by the other one."""
+    setting, base, runs = _twice_wrong(second)
+    assert record_errors(setting, (base,), base, runs) is None
+    found = record_errors(setting, (base,), base, runs, on_trial=True)
     assert found is not None
-    assert found.error.on_trial
     assert found.beside == ()
-    assert found.error.run in NAMES[:3:2]
+    sizes = {(one.run, one.coefficient): one for one in found.errors}
+    assert set(sizes) == {("run 0", coefficient), ("run 2", "input_level.gain")}
+    for one, right in ((sizes["run 0", coefficient], value), (sizes["run 2", "input_level.gain"], -0.1)):
+        assert not one.on_trial  # noise is left with both
+        assert one.value == pytest.approx(right, abs=max(4.0 * one.standard_error, 1e-3 * abs(right)))
 
 
 @pytest.mark.parametrize("left", [1.0, 5.0])
@@ -167,8 +184,8 @@ def test_a_record_on_trial_stands_where_the_search_beside_it_comes_down_to_noise
         model = Model((), np.zeros(1), samples * noises**2, np.zeros((1, 1)), 0.0)
         return context, Outcome(cast(Any, None), model, model)
 
-    def wrong(context: Context, _: Outcome) -> FoundRecordError | None:
-        return FoundRecordError(tried, ()) if context.records.trials else None
+    def wrong(context: Context, _: Outcome) -> FoundRecordErrors | None:
+        return FoundRecordErrors((tried,), ()) if context.records.may_try else None
 
     for name, instead in (("prepared", context), ("searched_finely", searched), ("wrong_record", wrong)):
         monkeypatch.setattr(loop, name, instead)
@@ -176,19 +193,19 @@ def test_a_record_on_trial_stands_where_the_search_beside_it_comes_down_to_noise
     records = [one.record for one in said if isinstance(one, Result)]
     if left < 2.0:
         assert final.records.errors == (dataclasses.replace(tried, on_trial=False),)
-        assert asked == [(0, True), (1, False)]
+        assert asked == [(0, True), (1, True)]
     else:
         assert final.records.errors == ()
         assert final.job.experiment is experiment
-        assert asked == [(0, True), (1, False), (0, False)]
+        assert asked == [(0, True), (1, True), (0, False)]
         assert "as they were logged" in what_is_searched(cast(NotConfirmed, records[-1]))
-    assert what_is_searched(cast(FoundRecordError, records[0])).endswith("on trial: more than noise is left")
+    assert what_is_searched(cast(FoundRecordErrors, records[0])).endswith("on trial: more than noise is left")
 
 
 def test_before_a_search_has_ended_the_model_with_the_error_has_to_leave_far_less() -> None:
     setting, base, extended, runs = _searched({}, _early, 0)
-    assert record_error(setting, (base, extended), extended, runs, FAR_LESS) is not None
-    assert record_error(setting, (base, extended), extended, runs, 1e3) is None
+    assert record_errors(setting, (base, extended), extended, runs, FAR_LESS) is not None
+    assert record_errors(setting, (base, extended), extended, runs, 1e3) is None
 
 
 def test_without_a_run_whose_record_is_wrong_little_is_left_of_the_others() -> None:
@@ -196,7 +213,8 @@ def test_without_a_run_whose_record_is_wrong_little_is_left_of_the_others() -> N
     joint = setting.joint(setting.candidates)
     noise = float(setting.problem.noise_sigma)
     model = fitted_model(joint, (), base.values, ())
-    before, after = left_of_the_others(joint, model, noise, ())
+    groups, before, after = left_of_the_others(joint, model, noise, ())
+    assert groups == [(run,) for run in range(len(runs))]
     assert before.shape == after.shape == (len(runs),)
     assert after[0] < 0.3 * before[0]
     assert (after[1:] > 0.5 * before[1:]).all()

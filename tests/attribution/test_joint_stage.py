@@ -18,7 +18,7 @@ from smajax.attribution.findings import Findings, LikelierModel, StepDependent
 from smajax.attribution.joint_stage import search_by_evidence
 from smajax.attribution.laplace_evidence import fitted_model
 from smajax.attribution.optimum import as_model
-from smajax.attribution.record_error import FoundRecordError, RecordError
+from smajax.attribution.record_error import FoundRecordErrors, RecordError
 from smajax.attribution.unknown.search import AskedFor, Lacking
 from smajax.core.progress import quiet
 from smajax.core.result_cache import ResultCache
@@ -149,7 +149,7 @@ def _stage_and_search(
 
 
 THREE = ("latent_heat", "creep", "radiation")
-FOUND = FoundRecordError(RecordError("steps", "voltage", "input_delay.delay", 0.8, 1e-3, 50.0, (), 60.0), ())
+FOUND = FoundRecordErrors((RecordError("steps", "voltage", "input_delay.delay", 0.8, 1e-3, 50.0, (), 60.0),), ())
 
 
 @pytest.mark.parametrize(
@@ -231,7 +231,7 @@ def test_a_wrong_record_is_asked_for_once_where_many_effects_leave_many_noises(
         return FOUND
 
     better = [False, False, False, True, False, False, True, True, True]
-    monkeypatch.setattr(joint_stage._Stage, "_better_without_a_run", lambda *_: better.pop(0))
+    monkeypatch.setattr(joint_stage._Stage, "_better_without_runs", lambda *_: better.pop(0))
 
     stage.setting.wrong_record = wrong_record
     search.fitted |= {effects: _model(effects, 5.0, odds) for effects, odds in ((THREE[:1], 3.0), (THREE[1:], 1.0))}
@@ -246,28 +246,6 @@ def test_a_wrong_record_is_asked_for_once_where_many_effects_leave_many_noises(
     assert stage.has_wrong_record(search, many)
     assert not stage.has_wrong_record(search, many)
     assert asked[1:] == [[(), THREE[:1], THREE, THREE]]
-
-
-@pytest.mark.parametrize(
-    ("after", "better"),
-    [
-        ([0.2, 0.9, 0.95], True),  # of 1.0
-        ([0.45, 0.9, 0.95], False),
-        ([0.4, 0.9, 0.95], True),  # half of what is left without any other run
-        ([0.14, 0.15, 0.15], True),  # next to noise
-        ([0.2], False),  # nothing is left of the others
-    ],
-)
-def test_a_run_keeps_much_from_the_others_where_little_is_left_without_it(
-    after: list[float], better: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    stage, search, _ = _stage_and_search(monkeypatch, [], [])
-    search.programs, search.noise, search.joint.ordered = (), 0.1, tuple
-    stage.setting.joint, stage.setting.candidates = lambda _: None, ()
-    monkeypatch.setattr(joint_stage, "fitted_model", lambda *_: None)
-    left = np.ones(len(after)), np.asarray(after)
-    monkeypatch.setattr(joint_stage, "left_of_the_others", lambda *_: left)
-    assert stage._better_without_a_run(search, cast(Any, _model(THREE, 5.0, 9.0))) is better
 
 
 def _begun(

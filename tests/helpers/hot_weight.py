@@ -22,6 +22,7 @@ from smajax.model.presets import build
 DT, SAMPLES, NOISE = 0.1, 200, 5e-5
 CANDIDATES = ("latent_heat", "rising_convection", "phase_resistance", "asymmetric_transformation", "sensor_gain")
 UNKNOWNS = ("convection_coefficient", "recoverable_strain")
+VOLTS = ((8.0, 0.0), (6.5, 0.0), (9.0, 4.0), (7.0, 5.5))  # of the first and the second half of each run
 
 
 def hot_weight(
@@ -29,12 +30,12 @@ def hot_weight(
     candidates: Sequence[str] = CANDIDATES,
     seed: int = 3,
     factors: Mapping[str, float] = MappingProxyType({}),
+    steps: Sequence[tuple[float, float]] = VOLTS,
 ) -> JointSearch:
-    """A search among `candidates` in four runs of a wire whose effects have the coefficients `truth`.
+    """A search among `candidates` in runs of a wire whose effects have the coefficients `truth`.
 
-    `factors`: of parameters of the wire that made the runs, over the preset's.
+    `factors`: of parameters of the wire that made the runs, over the preset's. `steps`: V, of the first and the second half of each run.
     """
-    steps = ((8.0, 0.0), (6.5, 0.0), (9.0, 4.0), (7.0, 5.5))
     volts = jnp.stack([jnp.repeat(jnp.asarray(pair), SAMPLES // 2) for pair in steps])
     base = build("flexinol_table_3_2", "dead_weight", "voltage")
     count = len(steps)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, overload
 
 from smajax.attribution.findings import Findings, Round
-from smajax.attribution.record_error import FoundRecordError, NotConfirmed
+from smajax.attribution.record_error import FoundRecordErrors, NotConfirmed
 from smajax.core.progress import Event, Message, Progress, Result
 from smajax.fit.identifiability import Checks
 from smajax.fit.identify_result import Identified
@@ -106,7 +106,7 @@ def narrated(progress: Progress, unit: str = "-", quantity: str = "") -> Progres
         elif isinstance(event, Result) and isinstance(event.record, Checks):
             for one in check_events(event.record):
                 progress(one)
-        elif isinstance(event, Result) and isinstance(event.record, FoundRecordError | NotConfirmed):
+        elif isinstance(event, Result) and isinstance(event.record, FoundRecordErrors | NotConfirmed):
             progress(Message(what_is_searched(event.record)))
         else:
             progress(event)

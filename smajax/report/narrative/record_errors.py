@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from smajax.attribution.findings import Findings
-from smajax.attribution.record_error import FoundRecordError, NotConfirmed, RecordError
+from smajax.attribution.record_error import FoundRecordErrors, NotConfirmed, RecordError
 from smajax.core.display_units import with_error
 from smajax.core.wording import and_listed
 
@@ -26,13 +26,14 @@ def of_wrong_records(findings: Findings) -> Iterator[str]:
         )
 
 
-def what_is_searched(one: FoundRecordError | NotConfirmed) -> str:
+def what_is_searched(one: FoundRecordErrors | NotConfirmed) -> str:
     """Why the search begins again: with a record corrected, or with those that were corrected on trial as they were logged."""
     if isinstance(one, NotConfirmed):
         names = and_listed([f"{wrong.channel} of {wrong.run}" for wrong in one.errors])
         return f"the {names} as corrected leaves more than noise; the search begins again with all runs as they were logged"
-    again = f"{what_was_wrong(one.error)}; the search begins again with that run corrected"
-    return f"{again}, on trial: more than noise is left" if one.error.on_trial else again
+    wrong = and_listed([what_was_wrong(error) for error in one.errors])
+    again = f"{wrong}; the search begins again with {'that run' if len(one.errors) == 1 else 'these runs'} corrected"
+    return f"{again}, on trial: more than noise is left" if one.errors[0].on_trial else again
 
 
 def what_was_wrong(one: RecordError) -> str:

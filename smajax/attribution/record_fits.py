@@ -1,0 +1,228 @@
+"""Fits of a model with an input of one run, or of two, as it may have been recorded wrongly: late, on another clock, at another level, or with another load than noted.
+
+Each is an effect of the library with a value of that run alone, and an event with the prior odds of one, shared among the runs. It
+is fitted together with all parameters of the base model and of the effects beside which it is sought, by one program for all of them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+
+from smajax.attribution.doubtful_runs import LEAST_RUNS_OF_TWO, left_without
+from smajax.attribution.joint_parameters import JointParameters
+from smajax.attribution.laplace_evidence import FittedModel, fitted_model
+from smajax.attribution.model_fits import Model, Search
+from smajax.attribution.program_fits import comparison_settings
+from smajax.core.names_of_runs import of_run
+from smajax.core.parameters import parameters
+from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
+from smajax.fit.outputs_of_runs import misfits
+from smajax.fit.problem import PerRun, Problem
+from smajax.fit.starts import nearest
+from smajax.model.effects.candidate import PRIOR_ODDS
+from smajax.model.effects.library import LIBRARY
+from smajax.model.effects.prior_width import CoefficientPrior
+from smajax.model.extended import with_effects
+from smajax.model.system import System
+
+MOST_RUNS = 2  # looked at, those without which least is left of the others: each costs a fit for every kind of error
+CLOSER = 3.0  # by which a fit is expected to come nearer: what its error is counted in while it runs
+MOST_LEFT = 2.0  # noises that the model with the error leaves: of one that leaves more no record is said to be wrong
+MOST_SHARES = (
+    (4, 0.6),
+    (8, 0.3),
+    (16, 0.1),
+)  # after so many steps a fit ends that leaves more than this share of the squares
+
+Host = Model | FittedModel  # a model beside which an error of a record is sought
+
+
+class Kind(NamedTuple):
+    """One way in which a record may be wrong. `sigma`: of its prior about zero, SI. `tried`: where fits begin."""
+
+    coefficient: str
+    sigma: float
+    tried: tuple[float, ...]
+    source: str
+
+
+KINDS = (
+    Kind(
+        "input_delay.delay",
+        0.3,
+        (-0.4, -0.15, -0.03, 0.03, 0.15, 0.4, 0.8, 1.6),
+        "a recorder that is started by hand or waits for a trigger: tenths of a second to a second",
+    ),
+    Kind("input_clock.rate", 0.01, (-0.02, -0.003, 0.003, 0.02), "loops timed by software: up to 1 %"),
+    Kind("input_level.gain", 0.1, (-0.2, -0.03, 0.03, 0.2), "a range or a set value that was noted wrongly: 5 to 20 %"),
+    Kind("wrong_load.share", 0.1, (-0.2, -0.03, 0.03, 0.2), "a weight that was noted wrongly or added to: 5 to 20 %"),
+)
+
+
+@dataclass(frozen=True)
+class _EventParameters(JointParameters):
+    """Those of a model with one value of one run's own; its problem is whole already."""
+
+    def restricted(self, effects: Sequence[str]) -> tuple[Problem, np.ndarray]:
+        own = self.problem
+        priors = self.prior_records(effects)
+        same = own.with_system(own.system, per_run=own.per_run, priors=priors)
+        return same, np.arange(len(own.names))
+
+
+class Event(NamedTuple):
+    """An error of one record, with its size, SI."""
+
+    coefficient: str
+    run: str
+    value: float
+
+    @property
+    def name(self) -> str:
+        return of_run(self.coefficient, self.run)
+
+
+class Fit(NamedTuple):
+    """A host with errors of records, fitted. `before`: what the host leaves without them, root mean square, SI."""
+
+    host: Host
+    events: tuple[Event, ...]
+    model: FittedModel
+    before: float
+
+
+def likeliest(fits: Sequence[Fit], error: float) -> Fit:
+    """The one of most evidence; `error` of an independent sample, SI."""
+    return max(fits, key=lambda one: one.model.log_evidence(error**2))
+
+
+@dataclass(frozen=True)
+class Beside:
+    """A host, and everything that may be wrong with a record of one of its runs: `possible` by their names, such as `input_delay.delay[steps]`."""
+
+    setting: Search
+    host: Host
+    joint: _EventParameters
+    possible: Mapping[str, tuple[Kind, str]]
+    left: np.ndarray  # (series, N), misfit of the host, SI
+
+    @classmethod
+    def of(cls, setting: Search, host: Host, runs: Sequence[str]) -> Beside | None:
+        """None where no record can be wrong in any of the ways known."""
+        own, slots = setting.restricted(host.effects)
+        values = jnp.asarray(host.values[slots])
+        system, known = own.system_at(values), own.per_run.names
+        kinds = [kind for kind in KINDS if kind.coefficient in own.per_run.single or _possible(kind, system)]
+        fresh = [kind.coefficient for kind in kinds if kind.coefficient not in known]
+        whole = with_effects(system, [name.split(".")[0] for name in fresh])
+        start = jnp.concatenate([own.per_run_at(values), jnp.zeros((len(runs), len(fresh)))], axis=1)
+        per_run = PerRun((*known, *fresh), tuple(runs), start, own.per_run.single)
+        problem = own.with_system(whole, per_run=per_run)
+        every = {of_run(kind.coefficient, run): (kind, run) for run in runs for kind in kinds}
+        # What was corrected before is a parameter of the base model.
+        possible = {name: one for name, one in every.items() if name not in setting.unknowns}
+        (left,) = misfits(own, [host.values[slots]])
+        return cls(setting, host, _with_events(setting, host, problem, possible), possible, left) if possible else None
+
+    def singly(self) -> list[Fit]:
+        """Each kind of error in each of the runs without which the host leaves least of the others."""
+        doubtful = left_without(self.setting, self.host).groups[:MOST_RUNS]
+        return self._fitted(
+            [(name,) for (run,) in doubtful for name in self._of(run)], self.joint.problem.start_values()
+        )
+
+    def in_two_runs(self, singly: Sequence[Fit], error: float) -> list[Fit]:
+        """Errors in two runs at once, where much less is left without these two than without any other two; `error` of an independent sample, SI.
+
+        The likeliest one of either run, beside it all of the other run, and beside the likeliest of these all of the first.
+        """
+        if self.joint.problem.batch.runs < LEAST_RUNS_OF_TWO:
+            return []
+        left = left_without(self.setting, self.host, 2)
+        if not left.stands_out:
+            return []
+        names = [name for run in left.groups[0] for name in self._of(run)]
+        known = {fit.events[0].name: fit for fit in singly}
+        fresh = [(name,) for name in names if name not in known]
+        known |= {fit.events[0].name: fit for fit in self._fitted(fresh, self.joint.problem.start_values())}
+        first = likeliest([known[name] for name in names], error)
+        kept = first.events[0].name
+        others = [name for name in names if self.possible[name][1] != first.events[0].run]
+        second = self._fitted([(kept, name) for name in others], first.model.values)
+        best = likeliest(second, error)
+        again = [name for name in names if name not in (kept, *others)]
+        return [*second, *self._fitted([(best.events[1].name, name) for name in again], best.model.values)]
+
+    def _of(self, run: int) -> list[str]:
+        """What may be wrong with the records of that fit run."""
+        name = self.joint.problem.per_run.runs[run]
+        return [event for event, (_, own) in self.possible.items() if own == name]
+
+    def _fitted(self, sets: Sequence[tuple[str, ...]], values: np.ndarray) -> list[Fit]:
+        """Sets of errors, from `values` (P,); the last of each begins at all its tried sizes, and what is in none of a set is zero."""
+        if not sets:
+            return []
+        setting, joint, host = self.setting, self.joint, self.host
+        count = float(np.asarray(joint.problem.batch.mask).sum())
+        noise, squares = float(setting.problem.noise_sigma), float((self.left**2).sum())
+        error = max(noise, float(np.sqrt(np.mean(self.left**2))) / CLOSER)
+        problem, _ = joint.restricted([*host.effects, *self.possible])
+        problem = problem.with_noise(error)
+        groups = []
+        for names in sets:
+            point = np.array(values)
+            point[[joint.slots[name] for name in self.possible if name not in names]] = 0.0
+            at = np.arange(len(point)) == joint.slots[names[-1]]
+            groups.append([np.where(at, size, point) for size in self.possible[names[-1]][0].tried])
+        tasks = [
+            problem.task(joint.free((*host.effects, *names)), joint.bounds, begun)
+            for names, begun in zip(sets, nearest(problem, groups), strict=True)
+        ]
+        settings = FitSettings(cache=setting.cache, progress=setting.progress)
+        settings = comparison_settings(settings, "inputs of single runs")
+        # Of a wrong record there is noise left when it is right; what comes nowhere near that in a few steps is none.
+        allowed = (MOST_LEFT * noise / error) ** 2 * count
+        excess = tuple((steps, max(share * squares / error**2, allowed)) for steps, share in MOST_SHARES)
+        settings = replace(settings, allowed_excess=excess, least_cost=0.0, promised_excess=None, one_of_each=0)
+        before = float(np.sqrt(squares / count))
+        found = []
+        for names, fit in zip(sets, levenberg_marquardt(problem, tasks, settings), strict=True):
+            events = [
+                Event(self.possible[name][0].coefficient, self.possible[name][1], float(fit.values[joint.slots[name]]))
+                for name in names
+            ]
+            model = fitted_model(joint, (*host.effects, *names), fit.values, ())
+            found.append(Fit(host, tuple(events), model, before))
+        return found
+
+
+def _possible(kind: Kind, system: System) -> bool:
+    """Whether a record of this system can be wrong in that way, and is not already taken to be."""
+    effect = kind.coefficient.split(".")[0]
+    return effect not in {one.effect_name for one in system.effects} and LIBRARY[effect].candidate.applies(system)
+
+
+def _with_events(
+    setting: Search, host: Host, problem: Problem, events: Mapping[str, tuple[Kind, str]]
+) -> _EventParameters:
+    """Parameters of models with the effects of `host` and one of `events`, with their priors."""
+    plain = setting.joint(host.effects)
+    table = parameters(problem.system)
+    odds = math.log(PRIOR_ODDS["event"] / problem.batch.runs)
+    return _EventParameters(
+        problem,
+        plain.unknowns,
+        {
+            **plain.bounds,
+            **{name: (table[kind.coefficient].low, table[kind.coefficient].high) for name, (kind, _) in events.items()},
+        },
+        {**plain.coefficients, **{name: (name,) for name in events}},
+        {**plain.priors, **{name: CoefficientPrior(0.0, kind.sigma, False) for name, (kind, _) in events.items()}},
+        {**plain.log_odds, **dict.fromkeys(events, odds)},
+    )
