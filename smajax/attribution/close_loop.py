@@ -162,7 +162,7 @@ def prepared(  # the stage's inputs, each once
     setting.after_round = None if interim is None else _now_and_then(context, interim)
     if len(records.errors) < MOST_RECORD_ERRORS:
         setting.wrong_record = partial(
-            record_errors, setting, runs=job.fit_runs, times_less=FAR_LESS, on_trial=records.may_try
+            record_errors, setting, runs=job.fit_runs, times_less=FAR_LESS, trials=records.may_try
         )
     return context
 
@@ -247,7 +247,7 @@ def wrong_record(context: Context, outcome: Outcome) -> FoundRecordErrors | None
     if not final.effects and setting.is_noise(final):
         return None
     hosts = [base, final] if final.effects else [base]
-    return record_errors(setting, hosts, final, context.job.fit_runs, on_trial=context.records.may_try)
+    return record_errors(setting, hosts, final, context.job.fit_runs, trials=context.records.may_try)
 
 
 def against_the_held_out_runs(context: Context, outcome: Outcome) -> tuple[Outcome, tuple[Rejected, ...]]:

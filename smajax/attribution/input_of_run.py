@@ -13,7 +13,7 @@ likelier than none by more than twenty to one, and the effects found beside it w
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from smajax.attribution.findings import ParameterFinding
@@ -42,13 +42,13 @@ def record_errors(
     present: Host,
     runs: Sequence[Run],
     times_less: float | None = None,
-    on_trial: bool = False,
+    trials: bool = False,
 ) -> FoundRecordErrors | None:
     """The likeliest error of the record of one fit run, where it is likelier than `present` by `LEAST_ODDS`; `runs` of the fit, in order.
 
     It is sought beside each of `hosts`, in the place of all effects that `present` has beside theirs. `times_less`: by which the model with it leaves less at least; None: it may leave as much.
-    `on_trial`: one that leaves more than noise is given as well if it alone explains nearly all that the base model leaves: what is left may be another one, and effects that are found beside it.
-    If it does not, so are two of different runs.
+    `trials`: if there is none, one that leaves more than noise is given as well, on trial, where it takes most of what the base model leaves of all runs: what is left may be another one, and effects
+    that are found beside it. If no single one does, two of different runs are sought.
     """
     if len(runs) < LEAST_RUNS:
         return None
@@ -66,23 +66,25 @@ def record_errors(
     def ahead(fit: Fit) -> float:
         return fit.model.log_evidence(error**2) - here.log_evidence(error**2)
 
+    def stands(fit: Fit) -> bool:
+        """Whether it is said that the records are wrong."""
+        near = times_less is not None and fit.model.rms > here.rms / times_less
+        return ahead(fit) >= LEAST_ODDS and fit.model.rms <= MOST_LEFT * noise and not near
+
+    def on_trial(fit: Fit) -> bool:
+        return ahead(fit) >= LEAST_ODDS and not fit.host.effects and fit.model.rms <= fit.before / ON_TRIAL
+
     found = likeliest(fits, error)
-    near = times_less is not None and found.model.rms > here.rms / times_less
-    if ahead(found) >= LEAST_ODDS and found.model.rms <= MOST_LEFT * noise and not near:
-        return _found(setting, found, present, runs, ahead(found), error)
-    base = [(one, its_fits) for one, its_fits in zip(sought, singly, strict=True) if not one.host.effects]
-    for tried in (fit for one, its_fits in base for fit in _nearest(one, its_fits, error)) if on_trial else ():
-        if ahead(tried) >= LEAST_ODDS and tried.model.rms <= tried.before / ON_TRIAL:
-            return _found(setting, tried, present, runs, ahead(tried), error, tried.model.rms > MOST_LEFT * noise)
-    return None
-
-
-def _nearest(beside: Beside, singly: Sequence[Fit], error: float) -> Iterator[Fit]:
-    """The likeliest of the errors of one record, and then that of two."""
-    yield likeliest(singly, error)
-    both = beside.in_two_runs(singly, error)
-    if both:
-        yield likeliest(both, error)
+    if not stands(found):
+        if not trials:
+            return None
+        alone = [fit for fit in fits if on_trial(fit)]
+        both = [] if alone else [fit for k, one in enumerate(sought) for fit in one.in_two_runs(singly[k], error)]
+        tried = alone or [fit for fit in both if stands(fit)] or [fit for fit in both if on_trial(fit)]
+        if not tried:
+            return None
+        found = likeliest(tried, error)
+    return _found(setting, found, present, runs, ahead(found), error, not stands(found))
 
 
 def _found(

@@ -157,8 +157,7 @@ class _Stage:
         programs = [search.joint.ordered(one) for one in search.programs]
         fitting = [one for one in programs if set(model.effects) <= set(one)]
         program = min(fitting, key=len, default=model.effects)
-        runs = self.setting.problem.batch.runs
-        most = 2 if runs >= LEAST_RUNS_OF_TWO and not model.effects else 1
+        most = 2 if self.setting.problem.batch.runs >= LEAST_RUNS_OF_TWO else 1
         return any(left_without(self.setting, model, count, program).stands_out for count in range(1, most + 1))
 
     def before_the_end(self, search: JointSearch, found: FittedModel) -> FittedModel | None:

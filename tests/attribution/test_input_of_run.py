@@ -118,40 +118,47 @@ def test_no_record_is_wrong_where_more_is_missing() -> None:
     assert record_errors(dataclasses.replace(setting, problem=problem), (base, extended), extended, runs) is None
 
 
-def _twice_wrong(second: Callable[[jax.Array], jax.Array]) -> tuple[Search, Model, list[Run]]:
-    """Six runs, the third at a level that was noted a tenth too high, and the first changed by `second`."""
-    joint = hot_weight({}, ("latent_heat",), steps=(*VOLTS, (7.5, 3.0), (8.5, 2.0))).joint
+def _twice_wrong(
+    second: Callable[[jax.Array], jax.Array], truth: dict[str, float]
+) -> tuple[Search, list[Model], list[Run]]:
+    """The base model and one with latent heat, of six runs, the third at a level that was noted a tenth too high, and the first changed by `second`."""
+    joint = hot_weight(truth, ("latent_heat",), steps=(*VOLTS, (7.5, 3.0), (8.5, 2.0))).joint
     batch = joint.problem.batch
     volts = batch.inputs["voltage"]
     volts = volts.at[2].set(volts[2] / 0.9).at[0].set(second(volts[0]))
     problem = dataclasses.replace(joint.problem, batch=dataclasses.replace(batch, inputs={"voltage": volts}))
     setting = Search(problem, UNKNOWNS, joint.bounds, ("latent_heat",), ResultCache())
-    (fit,), _ = setting.fit([Start((), problem.start_values())], "a fit", settled=1e-3)
+    models = []
+    for effects in ((), ("latent_heat",)):
+        (fit,), _ = setting.fit([Start(effects, problem.start_values())], "a fit", settled=1e-3)
+        models.append(Model(effects, fit.values, fit.cost, np.zeros(volts.shape), 0.0))
     time = np.asarray(DT * np.arange(SAMPLES), dtype=np.float64)
     runs = [
         Run(f"run {k}", "fit", time, {"voltage": np.asarray(one)}, {"position": problem.measured[k]}, {}, (), "")
         for k, one in enumerate(volts)
     ]
-    return setting, Model((), fit.values, fit.cost, np.zeros(volts.shape), 0.0), runs
+    return setting, models, runs
 
 
 @pytest.mark.parametrize(
-    ("second", "coefficient", "value"),
+    ("second", "coefficient", "value", "truth"),
     [
-        (_early, "input_delay.delay", 0.6),
-        pytest.param(lambda volts: volts / 1.08, "input_level.gain", 0.08, marks=pytest.mark.slow),
+        (_early, "input_delay.delay", 0.6, {}),
+        pytest.param(lambda volts: volts / 1.08, "input_level.gain", 0.08, {}, marks=pytest.mark.slow),
+        (_early, "input_delay.delay", 0.6, {"latent_heat.enthalpy": 1.2e4}),
     ],
-    ids=["recorded early", "noted too low"],
+    ids=["recorded early", "noted too low", "recorded early beside a latent heat"],
 )
 def test_records_that_are_wrong_in_two_runs_are_named_together(
-    second: Callable[[jax.Array], jax.Array], coefficient: str, value: float
+    second: Callable[[jax.Array], jax.Array], coefficient: str, value: float, truth: dict[str, float]
 ) -> None:
     """With either corrected much is left by the other one."""
-    setting, base, runs = _twice_wrong(second)
-    assert record_errors(setting, (base,), base, runs) is None
-    found = record_errors(setting, (base,), base, runs, on_trial=True)
+    setting, (base, extended), runs = _twice_wrong(second, truth)
+    hosts = (base, extended) if truth else (base,)
+    assert record_errors(setting, hosts, base, runs) is None
+    found = record_errors(setting, hosts, base, runs, trials=True)
     assert found is not None
-    assert found.beside == ()
+    assert found.beside == tuple(dict.fromkeys(name.split(".")[0] for name in truth))
     sizes = {(one.run, one.coefficient): one for one in found.errors}
     assert set(sizes) == {("run 0", coefficient), ("run 2", "input_level.gain")}
     for one, right in ((sizes["run 0", coefficient], value), (sizes["run 2", "input_level.gain"], -0.1)):
