@@ -197,8 +197,9 @@ class SwitchedSteps(eqx.Module):
 
         march = integrate(advance, Carry((carry, carry)), (jnp.arange(3), lengths, held), Schedule(3))
         split, whole = march.end.state
-        moved = jax.tree.map(lambda alone, two: alone + (two - lax.stop_gradient(two)), whole, split)
-        return where_tree(at_end, moved, split)
+        moved = jax.tree.map(lambda alone, two: alone + (two - lax.stop_gradient(two)), whole.state, split.state)
+        # What is remembered of steps has no derivative, and may be infinite.
+        return where_tree(at_end, Carry(moved, whole.memory), split)
 
 
 def _without_derivative(condition: Any, tree: Any) -> Any:

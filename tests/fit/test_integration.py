@@ -21,6 +21,7 @@ from smajax.fit.integration import (
 from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
 from smajax.fit.outputs_of_runs import predicted_and_derivatives, predicted_at
 from smajax.fit.problem import Problem
+from smajax.model.extended import extended
 from smajax.simulation.steppers import ONE_STEP, Integration
 from studies import integration as study
 from tests.helpers.often import often
@@ -53,6 +54,17 @@ def test_the_error_that_is_reported_is_that_against_the_reference(name: str) -> 
     assert reported.share == pytest.approx(exact[0], rel=0.15)
     assert not reported.small
     assert reported.description == "one step a sample"
+
+
+@pytest.mark.parametrize("lag", ["input_delay", "input_clock"])
+def test_an_input_that_is_not_late_is_integrated_as_finely_as_without_that_effect(lag: str) -> None:
+    """It switches where a step begins. With the delay or the clock of another run's record the integration was one step a sample, because the reference had no numbers."""
+    plain = _problem("dead weight", 0.1)
+    late = plain.with_system(extended(plain.system, (lag,)))
+    chosen = choose_integration(late, late.system)
+    assert described(chosen) == described(choose_integration(plain, plain.system)) != described(ONE_STEP)
+    error, own = (integration_error(one, one.system) for one in (with_integration(late, chosen), _chosen(plain)))
+    assert error.share == pytest.approx(own.share, rel=0.01)
 
 
 def test_one_step_a_sample_is_chosen_when_it_is_accurate_enough() -> None:
