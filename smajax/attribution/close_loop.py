@@ -247,7 +247,8 @@ def wrong_record(context: Context, outcome: Outcome) -> FoundRecordErrors | None
     if not final.effects and setting.is_noise(final):
         return None
     hosts = [base, final] if final.effects else [base]
-    return record_errors(setting, hosts, final, context.job.fit_runs, trials=context.records.may_try)
+    found = record_errors(setting, hosts, final, context.job.fit_runs, trials=context.records.may_try)
+    return found if found is not None and found.errors else None
 
 
 def against_the_held_out_runs(context: Context, outcome: Outcome) -> tuple[Outcome, tuple[Rejected, ...]]:

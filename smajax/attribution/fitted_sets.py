@@ -43,6 +43,9 @@ class JointSearch:
     # Whether the record of one run is wrong where a model of many effects leaves many noises: the search ends, and is made again with it corrected.
     has_wrong_record: Callable[[FittedModel], bool] = lambda _: False
     wrong_record: FoundRecordErrors | None = None
+    free_beside: tuple[str, ...] | None = (
+        None  # effects beside which free values of presets leave next to noise, if that ended the search
+    )
     lacking: AskedFor | None = None  # unknown terms beside the base model, where they were asked for
 
     def error(self, model: FittedModel) -> float:

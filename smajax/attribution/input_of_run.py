@@ -20,7 +20,7 @@ from smajax.attribution.findings import ParameterFinding
 from smajax.attribution.laplace_evidence import fitted_model, independent_error
 from smajax.attribution.model_fits import Search
 from smajax.attribution.record_error import FoundRecordErrors, RecordError
-from smajax.attribution.record_fits import KINDS, MOST_LEFT, Beside, Fit, Host, likeliest
+from smajax.attribution.record_fits import KINDS, MOST_LEFT, Beside, Fit, Host, likeliest, needed
 from smajax.core.names_of_runs import of_run
 from smajax.core.parameters import parameters
 from smajax.data.experiment.record import Experiment, Prior, Run, Unknown
@@ -49,6 +49,7 @@ def record_errors(
     It is sought beside each of `hosts`, in the place of all effects that `present` has beside theirs. `times_less`: by which the model with it leaves less at least; None: it may leave as much.
     `trials`: if there is none, one that leaves more than noise is given as well, on trial, where it takes most of what the base model leaves of all runs: what is left may be another one, and effects
     that are found beside it. If no single one does, two of different runs are sought.
+    Without errors where none is needed beside effects that leave next to noise: the values of presets, which are free here, were what was missing.
     """
     if len(runs) < LEAST_RUNS:
         return None
@@ -66,25 +67,31 @@ def record_errors(
     def ahead(fit: Fit) -> float:
         return fit.model.log_evidence(error**2) - here.log_evidence(error**2)
 
-    def stands(fit: Fit) -> bool:
-        """Whether it is said that the records are wrong."""
+    def explains(fit: Fit) -> bool:
+        """Whether next to noise is left, and the model is likelier than the present one."""
         near = times_less is not None and fit.model.rms > here.rms / times_less
         return ahead(fit) >= LEAST_ODDS and fit.model.rms <= MOST_LEFT * noise and not near
 
     def on_trial(fit: Fit) -> bool:
         return ahead(fit) >= LEAST_ODDS and not fit.host.effects and fit.model.rms <= fit.before / ON_TRIAL
 
-    found = likeliest(fits, error)
-    if not stands(found):
-        if not trials:
-            return None
-        alone = [fit for fit in fits if on_trial(fit)]
-        both = [] if alone else [fit for k, one in enumerate(sought) for fit in one.in_two_runs(singly[k], error)]
-        tried = alone or [fit for fit in both if stands(fit)] or [fit for fit in both if on_trial(fit)]
+    def found(tried: Sequence[Fit]) -> FoundRecordErrors | None:
         if not tried:
             return None
-        found = likeliest(tried, error)
-    return _found(setting, found, present, runs, ahead(found), error, not stands(found))
+        fit = likeliest(tried, error)
+        return _found(setting, fit, present, runs, ahead(fit), error, not explains(fit))
+
+    wrong = [fit for fit in fits if needed(fit, error, LEAST_ODDS)]
+    explained = [fit for fit in fits if explains(fit)]
+    if explained:
+        first = likeliest(explained, error)
+        return found([first]) if first in wrong else FoundRecordErrors((), first.host.effects)
+    alone = [fit for fit in wrong if on_trial(fit)]
+    if alone or not trials:
+        return found(alone) if trials else None
+    both = [fit for k, one in enumerate(sought) for fit in one.in_two_runs(singly[k], error)]
+    both = [fit for fit in both if needed(fit, error, LEAST_ODDS)]
+    return found([fit for fit in both if explains(fit)]) or found([fit for fit in both if on_trial(fit)])
 
 
 def _found(

@@ -114,6 +114,8 @@ class _Stage:
             return free, search_jointly(free, {(): after.values})
         held.programs = free.programs
         found = search_jointly(held, {(): base})
+        if held.free_beside is not None:
+            return self.resumed(held, held.fitted[held.free_beside], most=1)
         return (held, found) if held.wrong_record else self.resumed(held, found)
 
     def in_place_of_many(self, search: JointSearch, found: FittedModel) -> FittedModel | None:
@@ -130,7 +132,7 @@ class _Stage:
         return self._one_effect(search, found, [named]) or found
 
     def has_wrong_record(self, search: JointSearch, found: FittedModel) -> bool:
-        """Whether an input of one run was recorded wrongly, asked once a search, where `found` has many effects and leaves many noises.
+        """Whether the search ends because an input of one run was recorded wrongly, asked once a search, where `found` has many effects and leaves many noises.
 
         They may stand in for it, and each round about them costs more than to ask. It is sought beside those of the base model and `found` that leave much less of the other runs when one run is left out, and the likeliest model
         of few effects; as long as none does, it is not asked.
@@ -148,8 +150,12 @@ class _Stage:
         # What many effects stand in for may be one of the few beside the record.
         hosts = [one for one, much in zip(models, better, strict=True) if much or one in likeliest]
         self.asked_for_records.add(search.thorough)
-        search.wrong_record = ask(hosts, found)
-        return search.wrong_record is not None
+        wrong = ask(hosts, found)
+        if wrong is not None and not wrong.errors:
+            search.free_beside = None if search.thorough else search.joint.ordered(wrong.beside)
+            return search.free_beside is not None
+        search.wrong_record = wrong
+        return wrong is not None
 
     def _better_without_runs(self, search: JointSearch, model: FittedModel) -> bool:
         """Whether next to noise is left of the others without one run, or little of what is, or half of what is left without any other run; or so without two."""

@@ -22,7 +22,7 @@ class RecordError:
 
 
 class FoundRecordErrors(NamedTuple):
-    """Errors of one record, or of two on trial, and the effects of the model that they were found beside."""
+    """Errors of one record, or of two, and the effects of the model that they were found beside; none where the values of presets alone are wrong beside these."""
 
     errors: tuple[RecordError, ...]
     beside: tuple[str, ...]

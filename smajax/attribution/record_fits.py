@@ -89,12 +89,29 @@ class Event(NamedTuple):
 
 
 class Fit(NamedTuple):
-    """A host with errors of records, fitted. `before`: what the host leaves without them, root mean square, SI."""
+    """A host with errors of records, fitted. `before`: what the host leaves without them, root mean square, SI; `log_prior_odds` of one error."""
 
     host: Host
     events: tuple[Event, ...]
     model: FittedModel
     before: float
+    log_prior_odds: float
+
+
+def needed(fit: Fit, error: float, odds: float) -> bool:
+    r"""Whether each of the errors has log odds of `odds` at least over none, beside the same model; `error` of an independent sample, SI.
+
+    By the density ratio of Savage and Dickey (Dickey 1971) with the posterior taken as normal: $z^2/2 + \ln(s/\sigma)$ with $z = v/s$, value over standard error, and the prior's $\sigma$, and the
+    prior odds. A model fitted with an error of a record has the values of presets free as well, and these alone may explain what is missing.
+    """
+    errors = fit.model.standard_errors(error**2)
+
+    def log_odds(event: Event) -> float:
+        own = errors[event.name]
+        prior = next(kind.sigma for kind in KINDS if kind.coefficient == event.coefficient)
+        return 0.5 * (event.value / own) ** 2 + math.log(own / prior) + fit.log_prior_odds
+
+    return all(log_odds(event) >= odds for event in fit.events)
 
 
 def likeliest(fits: Sequence[Fit], error: float) -> Fit:
@@ -198,7 +215,7 @@ class Beside:
                 for name in names
             ]
             model = fitted_model(joint, (*host.effects, *names), fit.values, ())
-            found.append(Fit(host, tuple(events), model, before))
+            found.append(Fit(host, tuple(events), model, before, joint.log_odds[names[-1]]))
         return found
 
 

@@ -27,6 +27,7 @@ from smajax.attribution.record_error import (
     NotConfirmed,
     RecordError,
 )
+from smajax.core.parameters import parameter_values, parameters
 from smajax.core.progress import Result
 from smajax.core.result_cache import ResultCache
 from smajax.data.experiment.load import load_experiment
@@ -34,6 +35,7 @@ from smajax.data.experiment.record import Experiment, Run
 from smajax.data.model_catalogue import CATALOGUE
 from smajax.fit.base_model import base_model
 from smajax.fit.experiment_problem import free_by_name, own_values
+from smajax.fit.preset_priors import preset_priors
 from smajax.report.narrative.record_errors import of_wrong_records, what_is_searched, what_was_wrong
 from tests.helpers.hot_weight import DT, SAMPLES, UNKNOWNS, VOLTS, hot_weight
 from tests.helpers.made_findings import made_findings
@@ -106,6 +108,27 @@ def test_where_every_record_is_right_none_is_named() -> None:
     setting, base, extended, runs = _searched({"latent_heat.enthalpy": 1.2e4}, _early, None)
     assert record_errors(setting, (base, extended), extended, runs) is None
     assert record_errors(setting, (base,), base, runs[:2]) is None  # of two that disagree either may be wrong
+
+
+def test_no_record_is_wrong_where_the_values_of_presets_are() -> None:
+    """Beside an error of a record these are free: that error is zero then, and the model leaves noise all the same."""
+    joint = hot_weight(
+        {}, ("latent_heat",), factors={"stress_slope_austenite": 1.2, "stress_slope_martensite": 0.9}
+    ).joint
+    problem = joint.problem
+    table, values = parameters(problem.system), parameter_values(problem.system)
+    presets = preset_priors(table, values, frozenset())
+    setting = Search(problem, UNKNOWNS, joint.bounds, ("latent_heat",), ResultCache(), presets=presets)
+    (fit,), _ = setting.fit([Start((), problem.start_values())], "a fit", settled=1e-3)
+    base = Model((), fit.values, fit.cost, np.zeros(problem.measured.shape), 0.0)
+    noise = float(setting.problem.noise_sigma)
+    assert fitted_model(setting.joint(()), (), fit.values, ()).rms > FAR_LESS * noise
+    time = np.asarray(DT * np.arange(SAMPLES), dtype=np.float64)
+    runs = [
+        Run(name, "fit", time, {"voltage": np.asarray(problem.batch.inputs["voltage"][k])}, {}, {}, (), "")
+        for k, name in enumerate(NAMES)
+    ]
+    assert record_errors(setting, (base,), base, runs) == FoundRecordErrors((), ())
 
 
 @pytest.mark.slow

@@ -152,6 +152,22 @@ THREE = ("latent_heat", "creep", "radiation")
 FOUND = FoundRecordErrors((RecordError("steps", "voltage", "input_delay.delay", 0.8, 1e-3, 50.0, (), 60.0),), ())
 
 
+def test_a_search_with_values_of_presets_held_ends_where_these_alone_were_missing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    stage, search, _ = _stage_and_search(monkeypatch, [], [])
+    stage.setting.wrong_record = lambda *_: FoundRecordErrors((), THREE[:1])
+    monkeypatch.setattr(joint_stage._Stage, "_better_without_runs", lambda *_: True)
+    search.joint.ordered, search.free_beside = tuple, None
+    search.fitted |= {THREE[:1]: _model(THREE[:1], 5.0, 3.0)}
+    many = cast(Any, _model(THREE, 5.0, 9.0))
+    search.thorough = False
+    assert stage.has_wrong_record(search, many)
+    assert (search.free_beside, search.wrong_record) == (THREE[:1], None)
+    search.thorough, search.free_beside = True, None  # they are free already
+    assert not stage.has_wrong_record(search, many)
+
+
 @pytest.mark.parametrize(
     ("effects", "left", "functions", "confirmed", "ended"),
     [
