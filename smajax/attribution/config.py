@@ -53,6 +53,7 @@ class AttributionConfig:
     # Held-out runs
     held_out_tolerance: float = 0.02  # by which two models' errors there differ without a meaning
     held_out_errors: float = 2.0  # standard errors, which chance may make: two models as good as each other are told apart in 1 to 7 of 100 cases
+    held_out_worse: float = 1.3  # times the base model's error there, from which effects that leave more than noise of the fit runs are not named
 
     # Confounders
     overlap_listed: float = 0.7  # of an effect's trace: a candidate that overlaps less hardly takes its place

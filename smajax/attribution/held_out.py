@@ -26,7 +26,7 @@ from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.optimum import final_model, without
 from smajax.attribution.paired_errors import Comparison, pooled_rms, runs_compared
-from smajax.attribution.residual_diagnostics import diagnosed, noise_by_output
+from smajax.attribution.residual_diagnostics import diagnosed, noise_by_output, noise_like
 from smajax.attribution.run_finding import BesideModels
 from smajax.attribution.values_per_run import on_runs
 from smajax.core.parameters import parameter_values
@@ -46,7 +46,7 @@ def validated(
 
     No fit sees them and nothing is added for them. They reject effects one after the other, beginning with the one that the evidence needs
     least, as long as they are predicted worse with it than without it beyond chance (`paired_errors`), or worse than by the base
-    model. In that case an effect stays whose removal makes it worse still, and another goes; all do where each would.
+    model: beyond chance, or, by a model that leaves more than noise of the fit runs, by `held_out_worse`. In that case an effect stays whose removal makes it worse still, and another goes; all do where each would.
     """
     error = search.error_of(final.effects)
     compared = whole = compare(job, setting, first, final)
@@ -71,7 +71,7 @@ def _with_one_fewer(  # what `validated` has at hand
     job: Job, setting: Search, search: JointSearch, first: Model, left: Model, compared: Compared, error: float
 ) -> Model | FittedModel | None:
     """`left` without the effect that the held-out runs reject; `first` where all go, and None where none does."""
-    worse_than_base = _beside(compared, compared, setting, "before") == "worse"
+    worse_than_base = _worse_than_base(compared, setting)
     for effect in reversed(left.effects):
         rest = without(search, left, effect, error) if len(left.effects) > 1 else first
         simpler = compare(job, setting, first, rest)
@@ -82,6 +82,18 @@ def _with_one_fewer(  # what `validated` has at hand
         if _beside(simpler, compared, setting) != "worse":
             return rest
     return first
+
+
+def _worse_than_base(compared: Compared, setting: Search) -> bool:
+    """Whether the held-out runs are predicted worse than by the base model. Few runs hardly tell that beyond chance; a model that does not explain the fit runs either has nothing to set against it."""
+    if _beside(compared, compared, setting, "before") == "worse":
+        return True
+    if noise_like(compared[2], setting.config):
+        return False
+    held_out = [run for run in compared[0] if run.role == "held-out"]
+    mine = pooled_rms([left for run in held_out for left in run.residuals("after")])
+    theirs = pooled_rms([left for run in held_out for left in run.residuals("before")])
+    return mine > setting.config.held_out_worse * theirs
 
 
 def _beside(new: Compared, old: Compared, setting: Search, which: Literal["before", "after"] = "after") -> Comparison:

@@ -17,7 +17,7 @@ LEFT = np.random.default_rng(1).normal(size=400)
 OWN = {letters: np.random.default_rng(ord(letters[-1])).normal(size=400) for letters in ("a", "b", "ab")}
 
 
-def _models(monkeypatch: pytest.MonkeyPatch, errors: dict[str, float]) -> tuple[list[str], Any]:
+def _models(monkeypatch: pytest.MonkeyPatch, errors: dict[str, float], explained: bool = True) -> tuple[list[str], Any]:
     """Stand-ins of models whose held-out residual has these root mean squares, by their effects; what was rejected."""
 
     def residual(effects: str) -> np.ndarray:
@@ -53,6 +53,7 @@ def _models(monkeypatch: pytest.MonkeyPatch, errors: dict[str, float]) -> tuple[
         held_out, "without", lambda search, left, gone, _: model("".join(left.effects).replace(gone, ""))
     )
     monkeypatch.setattr(held_out, "final_model", lambda search, setting, fitted, _: fitted)
+    monkeypatch.setattr(held_out, "noise_like", lambda *_: explained)
     noted: list[str] = []
     setting: Any = SimpleNamespace(config=AttributionConfig(), set_aside=lambda model, reason, gone: noted.extend(gone))
     left, _, rejected = validated(None, setting, search, model(""), model("ab"))  # type: ignore[arg-type]
@@ -74,5 +75,16 @@ def test_what_predicts_the_held_out_runs_worse_is_rejected(
     monkeypatch: pytest.MonkeyPatch, errors: dict[str, float], rejected: list[str]
 ) -> None:
     found, left = _models(monkeypatch, errors)
+    assert found == rejected
+    assert left.effects == tuple(name for name in "ab" if name not in rejected)
+
+
+@pytest.mark.parametrize(("explained", "rejected"), [(False, ["b"]), (True, [])])
+def test_what_explains_neither_the_fit_runs_nor_predicts_others_is_rejected(
+    monkeypatch: pytest.MonkeyPatch, explained: bool, rejected: list[str]
+) -> None:
+    """Where chance may make the difference, an error of 1.3 times the base model's is enough, unless the fit runs are explained."""
+    monkeypatch.setattr(held_out, "runs_compared", lambda *_: "alike")
+    found, left = _models(monkeypatch, {"": 1.0, "a": 1.2, "ab": 1.5, "b": 1.1}, explained)
     assert found == rejected
     assert left.effects == tuple(name for name in "ab" if name not in rejected)
