@@ -151,25 +151,31 @@ def test_the_shape_of_a_branch_in_numbers() -> None:
         assert min(shape[:3]) > 0.0
 
 
+def _places_of_branch(s: jax.Array, z: jax.Array, cooling: jax.Array, once: bool) -> jax.Array:
+    """By the curve of one branch, and by `place_on`; `once`: by the effect as it is prepared for a run."""
+    names = TransformationCurve.candidate.switches
+    effect = TransformationCurve(**dict(zip(names, [*s, *(-0.5 * s)], strict=True)))
+    effect = effect.prepared() if once else effect
+    both = jnp.where(cooling, 1.0 - effect.cooling_place(1.0 - z), effect.heating_place(z))
+    return jnp.stack([both, effect.place_on(cooling, z)])
+
+
+# Compiled once, not for every example.
+PLACES = jax.jit(_places_of_branch, static_argnums=3)
+SLOPES = [jax.jit(jax.jacobian(_places_of_branch, argument), static_argnums=3) for argument in (0, 1)]
+
+
 @settings(deadline=None, max_examples=25)
 @given(s=SIX, z=st.floats(-1.0, 2.0), cooling=st.booleans())
 def test_prepared_the_effect_has_the_same_places_and_derivatives_on_either_branch(
     s: list[float], z: float, cooling: bool
 ) -> None:
     """`prepared` computes once a run what is of the coefficients alone, and `place_on` looks one of the two curves up."""
-
-    def places(s: jax.Array, z: jax.Array, once: bool) -> jax.Array:
-        names = TransformationCurve.candidate.switches
-        effect = TransformationCurve(**dict(zip(names, [*s, *(-0.5 * s)], strict=True)))
-        effect = effect.prepared() if once else effect
-        both = jnp.where(cooling, 1.0 - effect.cooling_place(1.0 - z), effect.heating_place(z))
-        return jnp.stack([both, effect.place_on(jnp.asarray(cooling), z)])
-
-    given = jnp.asarray(s), jnp.asarray(z)
-    apart, once = (jax.jit(places, static_argnums=2)(*given, one) for one in (False, True))
+    given = jnp.asarray(s), jnp.asarray(z), jnp.asarray(cooling)
+    apart, once = (PLACES(*given, one) for one in (False, True))
     np.testing.assert_allclose(once, np.full(2, apart[0]), rtol=1e-12, atol=1e-12)
-    for argument in (0, 1):
-        slopes = [jax.jit(jax.jacobian(places, argument), static_argnums=2)(*given, one) for one in (False, True)]
+    for slope in SLOPES:
+        slopes = [slope(*given, one) for one in (False, True)]
         np.testing.assert_allclose(slopes[1], slopes[0], rtol=1e-9, atol=1e-12)
 
 
