@@ -26,7 +26,7 @@ from smajax.attribution.findings import (
 )
 from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.held_out import compare, validated
-from smajax.attribution.input_of_run import FAR_LESS, corrected, record_errors
+from smajax.attribution.input_of_run import FAR_LESS, corrected, record_errors, standing
 from smajax.attribution.job import job_of
 from smajax.attribution.joint_stage import (
     base_alone,
@@ -104,6 +104,8 @@ def close_loop(  # keywords, which a caller names one by one
         interim(known_so_far(context, (outcome.search, outcome.base, outcome.final), Remaining.CHECKS))
     outcome, rejected = against_the_held_out_runs(context, outcome)
     outcome = against_an_outlier_run(context, against_an_unknown_term(context, outcome))
+    if leaves_little(context, outcome.final):
+        context = replace(context, records=context.records.confirmed())
     found = findings_of(context, outcome, compare(context.job, context.setting, outcome.base, outcome.final), rejected)
     provenance = _provenance(experiment, cache, command, seed, clock.monotonic() - began)
     return replace(found, provenance=provenance)
@@ -182,24 +184,30 @@ def _now_and_then(context: Context, interim: Interim) -> Callable[[JointSearch, 
     return after_round
 
 
-def with_records_corrected(context: Context) -> tuple[Context, Outcome]:
+def with_records_corrected(context: Context, logged: Experiment | None = None) -> tuple[Context, Outcome]:
     """The search; where an input of a run was recorded wrongly, again with that run corrected. All else is asked of the runs as they should have been recorded.
 
-    One that is corrected on trial stands where the model found at the end leaves little more than noise. Otherwise the search is made again without.
+    One that is corrected on trial stands where the model found at the end leaves little more than noise; all stand where that model needs them. Otherwise the search is made again without.
+    `logged`: the experiment with all runs as they were logged; None: that of `context`.
     """
-    first = context
-    context, outcome = searched_finely(context)
+    begun, logged = context, logged or context.job.experiment
+    first = context, outcome = searched_finely(context)
     while len(context.records.errors) < MOST_RECORD_ERRORS and (wrong := wrong_record(context, outcome)) is not None:
         context.setting.progress(Result(wrong))
         records = replace(context.records, errors=(*context.records.errors, *wrong.errors))
         context = _again(context, reduce(corrected, wrong.errors, context.job.experiment), records)
         context, outcome = searched_finely(context, (outcome.search, wrong.beside))
-    if not context.records.on_trial:
+    errors = context.records.errors
+    stand = standing(errors, outcome.search, outcome.final, len(context.job.fit_runs))
+    if context.records.on_trial and not leaves_little(context, outcome.final):
+        stand = ()
+    if len(stand) == len(errors):
         return context, outcome
-    if _leaves_little(context, outcome.final):
-        return replace(context, records=context.records.confirmed()), outcome
-    context.setting.progress(Result(NotConfirmed(context.records.errors)))
-    return with_records_corrected(_again(first, first.job.experiment, CorrectedRecords(trials=False)))
+    context.setting.progress(Result(NotConfirmed(tuple(one for one in errors if one not in stand))))
+    records = CorrectedRecords(stand, trials=False)
+    if first[1].search.wrong_record is None and stand == begun.records.errors:  # the first search had come to its end
+        return replace(first[0], records=records), first[1]
+    return with_records_corrected(_again(begun, reduce(corrected, stand, logged), records), logged)
 
 
 def _again(context: Context, experiment: Experiment, records: CorrectedRecords) -> Context:
@@ -210,10 +218,10 @@ def _again(context: Context, experiment: Experiment, records: CorrectedRecords) 
     )
 
 
-def _leaves_little(context: Context, model: Model) -> bool:
+def leaves_little(context: Context, model: Model) -> bool:
     """Whether a model leaves no more of the fit runs than one with a wrong record may."""
     samples = float(np.asarray(context.job.problem.batch.mask).sum())
-    return float(np.sqrt(model.cost / samples)) < MOST_LEFT
+    return float(np.sqrt(model.cost / samples)) <= MOST_LEFT
 
 
 def searched_finely(

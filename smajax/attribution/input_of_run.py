@@ -14,13 +14,15 @@ likelier than none by more than twenty to one, and the effects found beside it w
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 from smajax.attribution.findings import ParameterFinding
-from smajax.attribution.laplace_evidence import fitted_model, independent_error
-from smajax.attribution.model_fits import Search
+from smajax.attribution.fitted_sets import JointSearch
+from smajax.attribution.laplace_evidence import FittedModel, fitted_model, independent_error
+from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.record_error import FoundRecordErrors, RecordError
-from smajax.attribution.record_fits import KINDS, MOST_LEFT, Beside, Fit, Host, likeliest, needed
+from smajax.attribution.record_fits import KINDS, LEAST_ODDS, MOST_LEFT, Beside, Fit, Host, likeliest, log_odds, needed
 from smajax.core.names_of_runs import of_run
 from smajax.core.parameters import parameters
 from smajax.data.experiment.record import Experiment, Prior, Run, Unknown
@@ -28,7 +30,6 @@ from smajax.fit.base_model import base_model
 from smajax.model.extended import with_effects
 from smajax.model.system import System, recorded_apart
 
-LEAST_ODDS = 3.0  # in log odds: twenty to one that the record is wrong, before a run is corrected by it
 FAR_LESS = 4.0  # times that what the present model leaves before a search has ended: what is missing may be what it has not come to yet
 ON_TRIAL = (
     4.0  # times less than the base model that values of one run, or of two, leave of all runs, to be corrected on trial
@@ -60,56 +61,73 @@ def record_errors(
         return None
     fits = [fit for its_fits in singly for fit in its_fits]
     here = fitted_model(setting.joint(setting.candidates), present.effects, present.values, present.effects)
-    noise = float(setting.problem.noise_sigma)
-    best = min([here, *(fit.model for fit in fits)], key=lambda model: model.rms)
-    error = independent_error(best, noise, setting.noise_given)
-
-    def ahead(fit: Fit) -> float:
-        return fit.model.log_evidence(error**2) - here.log_evidence(error**2)
-
-    def explains(fit: Fit) -> bool:
-        """Whether next to noise is left, and the model is likelier than the present one."""
-        near = times_less is not None and fit.model.rms > here.rms / times_less
-        return ahead(fit) >= LEAST_ODDS and fit.model.rms <= MOST_LEFT * noise and not near
-
-    def on_trial(fit: Fit) -> bool:
-        return ahead(fit) >= LEAST_ODDS and not fit.host.effects and fit.model.rms <= fit.before / ON_TRIAL
+    compared = _Compared(here, float(setting.problem.noise_sigma), setting.noise_given, times_less, fits)
 
     def found(tried: Sequence[Fit]) -> FoundRecordErrors | None:
-        if not tried:
-            return None
-        fit = likeliest(tried, error)
-        return _found(setting, fit, present, runs, ahead(fit), error, not explains(fit))
+        return _found(setting, compared, tried, present, runs) if tried else None
 
-    wrong = [fit for fit in fits if needed(fit, error, LEAST_ODDS)]
-    explained = [fit for fit in fits if explains(fit)]
+    explained = compared.explaining(fits)
     if explained:
-        first = likeliest(explained, error)
-        return found([first]) if first in wrong else FoundRecordErrors((), first.host.effects)
-    alone = [fit for fit in wrong if on_trial(fit)]
+        first = likeliest(explained, compared.error)
+        beside = FoundRecordErrors((), first.host.effects)
+        return found([first]) if needed(first, compared.error, len(runs)) else beside
+    alone = [fit for fit in compared.on_trial(fits) if needed(fit, compared.error, len(runs))]
     if alone or not trials:
         return found(alone) if trials else None
-    both = [fit for k, one in enumerate(sought) for fit in one.in_two_runs(singly[k], error)]
-    both = [fit for fit in both if needed(fit, error, LEAST_ODDS)]
-    return found([fit for fit in both if explains(fit)]) or found([fit for fit in both if on_trial(fit)])
+    both = [fit for k, one in enumerate(sought) for fit in one.in_two_runs(singly[k], compared.error)]
+    compared = replace(compared, fits=(*fits, *both))
+    both = [fit for fit in both if needed(fit, compared.error, len(runs))]
+    return found(compared.explaining(both)) or found(compared.on_trial(both))
+
+
+@dataclass(frozen=True)
+class _Compared:
+    """What fits with errors of records are held against: the present model, the noise (SI), and each other. `times_less` as of `record_errors`."""
+
+    present: FittedModel
+    noise: float
+    noise_given: bool
+    times_less: float | None
+    fits: Sequence[Fit]
+
+    @cached_property
+    def error(self) -> float:
+        """Of an independent sample, SI, by the model that leaves least."""
+        best = min([self.present, *(fit.model for fit in self.fits)], key=lambda model: model.rms)
+        return independent_error(best, self.noise, self.noise_given)
+
+    def ahead(self, fit: Fit) -> float:
+        """In log odds of the present model."""
+        return fit.model.log_evidence(self.error**2) - self.present.log_evidence(self.error**2)
+
+    def explaining(self, fits: Sequence[Fit]) -> list[Fit]:
+        """Those that leave next to noise, and are likelier than the present model."""
+        most = MOST_LEFT * self.noise
+        if self.times_less is not None:
+            most = min(most, self.present.rms / self.times_less)
+        return [fit for fit in fits if fit.model.rms <= most and self.ahead(fit) >= LEAST_ODDS]
+
+    def on_trial(self, fits: Sequence[Fit]) -> list[Fit]:
+        """Those that take most of what the base model leaves, and are likelier than the present model."""
+        beside_none = [fit for fit in fits if not fit.host.effects and fit.model.rms <= fit.before / ON_TRIAL]
+        return [fit for fit in beside_none if self.ahead(fit) >= LEAST_ODDS]
 
 
 def _found(
-    setting: Search, found: Fit, present: Host, runs: Sequence[Run], ahead: float, error: float, on_trial: bool = False
+    setting: Search, compared: _Compared, tried: Sequence[Fit], present: Host, runs: Sequence[Run]
 ) -> FoundRecordErrors:
-    """The errors of a fit, as they are reported; `ahead` in log odds of `present`, `error` of an independent sample, SI."""
-    errors = found.model.standard_errors(error**2)
+    """The errors of the likeliest of the fits that were `tried`, as they are reported."""
+    found = likeliest(tried, compared.error)
+    errors = found.model.standard_errors(compared.error**2)
     instead = tuple(effect for effect in present.effects if effect not in found.host.effects)
+    on_trial = not compared.explaining([found])
     records = []
     for event in found.events:
         run = next(one for one in runs if one.name == event.run)
         channel = _channel(setting.problem.system, event.coefficient, run)
+        size = event.value, errors[event.name], compared.ahead(found)
         seconds = float(run.time[-1] - run.time[0])
-        records.append(
-            RecordError(
-                run.name, channel, event.coefficient, event.value, errors[event.name], ahead, instead, seconds, on_trial
-            )
-        )
+        records.append(RecordError(run.name, channel, event.coefficient, *size, instead, seconds, on_trial))
     return FoundRecordErrors(tuple(records), found.host.effects)
 
 
@@ -136,6 +154,19 @@ def corrected(experiment: Experiment, found: RecordError) -> Experiment:
         unknowns=(*experiment.unknowns, unknown),
         parameters={**experiment.parameters, found.coefficient: 0.0},
     )
+
+
+def standing(errors: Sequence[RecordError], search: JointSearch, final: Model, runs: int) -> tuple[RecordError, ...]:
+    """Those of the errors that the final model of a search needs, of so many `runs`: one that was found beside less may be none beside what was found later."""
+    model = search.fitted[search.joint.ordered(final.effects)]
+    sizes = model.standard_errors(search.error(model) ** 2)
+
+    def stands(one: RecordError) -> bool:
+        name = of_run(one.coefficient, one.run)
+        value = float(final.values[search.joint.slots[name]])
+        return log_odds(one.coefficient, value, sizes[name], runs) >= LEAST_ODDS
+
+    return tuple(one for one in errors if stands(one))
 
 
 def as_fitted(found: RecordError, after: Sequence[ParameterFinding]) -> RecordError:

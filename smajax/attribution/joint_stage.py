@@ -132,9 +132,9 @@ class _Stage:
         return self._one_effect(search, found, [named]) or found
 
     def has_wrong_record(self, search: JointSearch, found: FittedModel) -> bool:
-        """Whether the search ends because an input of one run was recorded wrongly, asked once a search, where `found` has many effects and leaves many noises.
+        """Whether the search ends because inputs of runs were recorded wrongly, or values of presets are all that was missing; asked once a search, where `found` has many effects and leaves many noises.
 
-        They may stand in for it, and each round about them costs more than to ask. It is sought beside those of the base model and `found` that leave much less of the other runs when one run is left out, and the likeliest model
+        They may stand in for it, and each round about them costs more than to ask. It is sought beside those of the base model and `found` that leave much less of the other runs when one or two runs are left out, and the likeliest model
         of few effects; as long as none does, it is not asked.
         """
         ask = self.setting.wrong_record
@@ -227,7 +227,9 @@ class _Stage:
         starts = self._starts(search, found, most, again.excluded)
         if base is not None:
             # What is held now lies where the base model has it.
-            free = again.joint.free(tuple(again.joint.coefficients))
+            free = set(again.joint.free(tuple(again.joint.coefficients)))
+            # An unknown that a corrected record has added was held at none before.
+            free -= set(self.setting.unknowns) - set(search.joint.unknowns)
             begin = [name for name in again.joint.slots if name in free and name in search.joint.slots]
             new, old = ([joint.slots[name] for name in begin] for joint in (again.joint, search.joint))
             for effects, values in starts.items():

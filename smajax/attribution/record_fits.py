@@ -14,7 +14,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.attribution.doubtful_runs import LEAST_RUNS_OF_TWO, left_without
+from smajax.attribution.doubtful_runs import LEAST_RUNS_OF_TWO, NEAR_NOISE, left_without
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model
 from smajax.attribution.model_fits import Model, Search
@@ -32,6 +32,7 @@ from smajax.model.extended import with_effects
 from smajax.model.system import System
 
 MOST_RUNS = 2  # looked at, those without which least is left of the others: each costs a fit for every kind of error
+LEAST_ODDS = 3.0  # in log odds: twenty to one that the record is wrong, before a run is corrected by it
 CLOSER = 3.0  # by which a fit is expected to come nearer: what its error is counted in while it runs
 MOST_LEFT = 2.0  # noises that the model with the error leaves: of one that leaves more no record is said to be wrong
 MOST_SHARES = (
@@ -89,29 +90,33 @@ class Event(NamedTuple):
 
 
 class Fit(NamedTuple):
-    """A host with errors of records, fitted. `before`: what the host leaves without them, root mean square, SI; `log_prior_odds` of one error."""
+    """A host with errors of records, fitted. `before`: what the host leaves without them, root mean square, SI."""
 
     host: Host
     events: tuple[Event, ...]
     model: FittedModel
     before: float
-    log_prior_odds: float
 
 
-def needed(fit: Fit, error: float, odds: float) -> bool:
-    r"""Whether each of the errors has log odds of `odds` at least over none, beside the same model; `error` of an independent sample, SI.
+def log_odds(coefficient: str, value: float, standard_error: float, runs: int) -> float:
+    r"""Of an error of one record of so many `runs`, over none beside the same model.
 
-    By the density ratio of Savage and Dickey (Dickey 1971) with the posterior taken as normal: $z^2/2 + \ln(s/\sigma)$ with $z = v/s$, value over standard error, and the prior's $\sigma$, and the
+    By the density ratio of Savage and Dickey (Dickey 1971) with the posterior taken as normal: $z^2/2 + \ln(s/\sigma)$ with $z = v/s$, value over standard error, and the prior's $\sigma$; and the
     prior odds. A model fitted with an error of a record has the values of presets free as well, and these alone may explain what is missing.
     """
+    sigma = next(kind.sigma for kind in KINDS if kind.coefficient == coefficient)
+    return 0.5 * (value / standard_error) ** 2 + math.log(standard_error / sigma) + _prior_odds(runs)
+
+
+def _prior_odds(runs: int) -> float:
+    """Log prior odds of an error of one record, shared among the runs."""
+    return math.log(PRIOR_ODDS["event"] / runs)
+
+
+def needed(fit: Fit, error: float, runs: int) -> bool:
+    """Whether each of the errors is likelier than none by `LEAST_ODDS`; `error` of an independent sample, SI, `runs` of the fit."""
     errors = fit.model.standard_errors(error**2)
-
-    def log_odds(event: Event) -> float:
-        own = errors[event.name]
-        prior = next(kind.sigma for kind in KINDS if kind.coefficient == event.coefficient)
-        return 0.5 * (event.value / own) ** 2 + math.log(own / prior) + fit.log_prior_odds
-
-    return all(log_odds(event) >= odds for event in fit.events)
+    return all(log_odds(one.coefficient, one.value, errors[one.name], runs) >= LEAST_ODDS for one in fit.events)
 
 
 def likeliest(fits: Sequence[Fit], error: float) -> Fit:
@@ -159,7 +164,8 @@ class Beside:
 
         The likeliest one of either run, beside it all of the other run, and beside the likeliest of these all of the first.
         """
-        if self.joint.problem.batch.runs < LEAST_RUNS_OF_TWO:
+        noise = float(self.setting.problem.noise_sigma)
+        if self.joint.problem.batch.runs < LEAST_RUNS_OF_TWO or self._before < NEAR_NOISE * noise:
             return []
         left = left_without(self.setting, self.host, 2)
         if not left.stands_out:
@@ -175,6 +181,11 @@ class Beside:
         best = likeliest(second, error)
         again = [name for name in names if name not in (kept, *others)]
         return [*second, *self._fitted([(best.events[1].name, name) for name in again], best.model.values)]
+
+    @property
+    def _before(self) -> float:
+        """What the host leaves, root mean square, SI."""
+        return float(np.sqrt((self.left**2).sum() / np.asarray(self.joint.problem.batch.mask).sum()))
 
     def _of(self, run: int) -> list[str]:
         """What may be wrong with the records of that fit run."""
@@ -207,7 +218,6 @@ class Beside:
         allowed = (MOST_LEFT * noise / error) ** 2 * count
         excess = tuple((steps, max(share * squares / error**2, allowed)) for steps, share in MOST_SHARES)
         settings = replace(settings, allowed_excess=excess, least_cost=0.0, promised_excess=None, one_of_each=0)
-        before = float(np.sqrt(squares / count))
         found = []
         for names, fit in zip(sets, levenberg_marquardt(problem, tasks, settings), strict=True):
             events = [
@@ -215,7 +225,7 @@ class Beside:
                 for name in names
             ]
             model = fitted_model(joint, (*host.effects, *names), fit.values, ())
-            found.append(Fit(host, tuple(events), model, before, joint.log_odds[names[-1]]))
+            found.append(Fit(host, tuple(events), model, self._before))
         return found
 
 
@@ -228,10 +238,10 @@ def _possible(kind: Kind, system: System) -> bool:
 def _with_events(
     setting: Search, host: Host, problem: Problem, events: Mapping[str, tuple[Kind, str]]
 ) -> _EventParameters:
-    """Parameters of models with the effects of `host` and one of `events`, with their priors."""
+    """Parameters of models with the effects of `host` and some of `events`, with their priors."""
     plain = setting.joint(host.effects)
     table = parameters(problem.system)
-    odds = math.log(PRIOR_ODDS["event"] / problem.batch.runs)
+    odds = _prior_odds(problem.batch.runs)
     return _EventParameters(
         problem,
         plain.unknowns,

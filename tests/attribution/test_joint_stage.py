@@ -168,6 +168,25 @@ def test_a_search_with_values_of_presets_held_ends_where_these_alone_were_missin
     assert not stage.has_wrong_record(search, many)
 
 
+def test_values_of_presets_are_free_from_the_effects_on_beside_which_they_alone_were_missing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    stage, search, _ = _stage_and_search(monkeypatch, [], [])
+    stage.setting.presets = {"damping": None}
+    search.fitted |= {(): _model((), 9.0, 0.0), THREE[:1]: _model(THREE[:1], 5.0, 3.0)}
+    search.programs, search.free_beside, search.wrong_record = (), THREE[:1], None
+    monkeypatch.setattr(joint_stage._Stage, "joint_search", lambda *_: search)
+    monkeypatch.setattr(joint_stage, "fitted_model", lambda *_: _model((), 9.0, 0.0))
+    monkeypatch.setattr(joint_stage, "fitted_from", lambda *_: _model((), 9.0, 0.0))
+    monkeypatch.setattr(joint_stage, "search_jointly", lambda *_: _model(THREE, 5.0, 9.0))
+    resumed: list[tuple[str, ...]] = []
+    monkeypatch.setattr(
+        joint_stage._Stage, "resumed", lambda _, search, found, most: resumed.append((*found.effects, str(most)))
+    )
+    stage._from_base(np.zeros(3), ())
+    assert resumed == [(*THREE[:1], "1")]
+
+
 @pytest.mark.parametrize(
     ("effects", "left", "functions", "confirmed", "ended"),
     [
@@ -270,21 +289,25 @@ def _begun(
     """Where the search begins that `then` makes of (setting, base, a search that has fitted three sets), whose runs have an unknown of their own since."""
     fitted = {FEW[:count]: _model(FEW[:count], 9.0 - count, 5.0) for count in range(3)}
     before = SimpleNamespace(
-        slots={"held": 0, "fitted": 1, "coefficient": 2}, ordered=tuple, without=lambda values, _: np.array(values)
+        slots={"held": 0, "fitted": 1, "coefficient": 2, "of a second record": 3},
+        unknowns=("fitted",),
+        ordered=tuple,
+        without=lambda values, _: np.array(values),
     )
     search = SimpleNamespace(fitted=fitted, error=lambda _: 1.0, excluded=frozenset(), programs=(), joint=before)
     begun: list[dict[tuple[str, ...], np.ndarray]] = []
     joint = SimpleNamespace(
-        slots={"fitted": 0, "held": 1, "new": 2, "coefficient": 3},
+        slots={"fitted": 0, "held": 1, "new": 2, "coefficient": 3, "of a second record": 4},
         coefficients={},
-        free=lambda _: ["fitted", "new", "coefficient"],
+        free=lambda _: ["fitted", "new", "coefficient", "of a second record"],
     )
     again = SimpleNamespace(programs=(), joint=joint, excluded=frozenset())
     monkeypatch.setattr(joint_stage._Stage, "joint_search", lambda *_: again)
     monkeypatch.setattr(joint_stage, "search_jointly", lambda _, starts: begun.append(starts))
     monkeypatch.setattr(joint_stage, "_kept_at_half_step", lambda _, searched: searched())
-    setting = SimpleNamespace(presets={}, config=AttributionConfig(), cache=None, progress=quiet)
-    then(setting, SimpleNamespace(values=np.ones(4)), search)
+    unknowns = ("fitted", "new", "of a second record")
+    setting = SimpleNamespace(presets={}, config=AttributionConfig(), cache=None, progress=quiet, unknowns=unknowns)
+    then(setting, SimpleNamespace(values=np.ones(5)), search)
     (starts,) = begun
     return starts
 
@@ -293,9 +316,9 @@ def test_with_a_finer_integration_the_search_goes_on_from_the_likeliest_models(m
     """Of these the base model begins where that integration has fitted it."""
     starts = _begun(monkeypatch, cast(Any, joint_stage.search_again))
     assert set(starts) == {(), FEW[:1], FEW[:2]}
-    assert starts[()].tolist() == [1.0] * 4
-    # What is not free now, and what there was not before, lies where the base model has it.
-    assert [values.tolist() for effects, values in starts.items() if effects] == [[0.0, 1.0, 1.0, 0.0]] * 2
+    assert starts[()].tolist() == [1.0] * 5
+    # What is not free now, and what there was not before or was held at none, lies where the base model has it.
+    assert [values.tolist() for effects, values in starts.items() if effects] == [[0.0, 1.0, 1.0, 0.0, 1.0]] * 2
 
 
 def test_with_a_record_corrected_the_search_begins_at_the_effects_beside_which_it_was_wrong(

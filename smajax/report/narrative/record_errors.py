@@ -16,8 +16,7 @@ def of_wrong_records(findings: Findings) -> Iterator[str]:
         instead = f" Without that the search names {and_listed(one.instead_of)} in its place." if one.instead_of else ""
         if one.on_trial:
             yield (
-                f"An input of one run may not be right: {what_was_wrong(one)}. It is corrected by that on trial, and stands if what is found beside it leaves "
-                "little more than noise."
+                f"An input of one run may not be right: {what_was_wrong(one)}. It is corrected by that on trial here, for more than noise is left."
             )
             continue
         yield (
@@ -29,8 +28,8 @@ def of_wrong_records(findings: Findings) -> Iterator[str]:
 def what_is_searched(one: FoundRecordErrors | NotConfirmed) -> str:
     """Why the search begins again: with a record corrected, or with those that were corrected on trial as they were logged."""
     if isinstance(one, NotConfirmed):
-        names = and_listed([f"{wrong.channel} of {wrong.run}" for wrong in one.errors])
-        return f"the {names} as corrected leaves more than noise; the search begins again with all runs as they were logged"
+        names = and_listed([f"the {wrong.channel} of {wrong.run}" for wrong in one.errors])
+        return f"no model that leaves little more than noise needs {names} corrected; the search goes on with what was logged"
     wrong = and_listed([what_was_wrong(error) for error in one.errors])
     again = f"{wrong}; the search begins again with {'that run' if len(one.errors) == 1 else 'these runs'} corrected"
     return f"{again}, on trial: more than noise is left" if one.errors[0].on_trial else again
