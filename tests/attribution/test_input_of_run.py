@@ -13,10 +13,12 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from smajax.attribution import record_fits
 from smajax.attribution.close_loop import close_loop
 from smajax.attribution.context import Context, Outcome
 from smajax.attribution.findings import Findings
 from smajax.attribution.input_of_run import FAR_LESS, corrected, record_errors, standing
+from smajax.attribution.job import job_of
 from smajax.attribution.laplace_evidence import fitted_model
 from smajax.attribution.leave_one_run_out import left_of_the_others
 from smajax.attribution.model_fits import Model, Search, Start
@@ -27,6 +29,7 @@ from smajax.attribution.record_error import (
     NotConfirmed,
     RecordError,
 )
+from smajax.attribution.record_fits import Beside
 from smajax.core.parameters import parameter_values, parameters
 from smajax.core.progress import Result
 from smajax.core.result_cache import ResultCache
@@ -325,6 +328,23 @@ def test_two_runs_may_each_have_an_error_of_one_kind() -> None:
     assert (own.names.count("input_delay.delay"), own.single) == (1, ("input_delay.delay",))
     begins = dict(zip(own.runs, np.asarray(own.start)[:, own.names.index("input_delay.delay")].tolist(), strict=True))
     assert begins == {run.name: {"steps": 0.8, "triangle": -0.3}.get(run.name, 0.0) for run in fit_runs}
+
+
+def test_an_error_of_a_kind_that_was_corrected_is_sought_in_the_other_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    job = job_of(corrected(_demo("complete"), FOUND))
+    setting = Search(job.problem, job.unknowns, job.bounds, (), ResultCache())
+    host = Model((), job.problem.start_values(), 1.0, np.zeros(job.problem.measured.shape), 1.0)
+    names = [run.name for run in job.fit_runs]
+    monkeypatch.setattr(record_fits, "misfits", lambda *_: [np.ones(job.problem.measured.shape)])  # nothing is fitted
+    beside = Beside.of(setting, host, names)
+    assert beside is not None
+    late = {name for name in beside.possible if name.startswith("input_delay")}
+    assert late == {f"input_delay.delay[{name}]" for name in names if name != "steps"}
+    assert "input_delay.delay[steps]" in beside.joint.free(())  # it stays an unknown
+    own = beside.joint.problem.per_run
+    assert len(own.names) == len(set(own.names))
+    begins = own.start[names.index("steps"), own.names.index("input_delay.delay")]
+    assert float(begins) == 0.8
 
 
 def test_what_was_wrong_with_one_run_is_nothing_that_other_runs_or_the_model_file_have() -> None:
