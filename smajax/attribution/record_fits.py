@@ -33,6 +33,8 @@ from smajax.model.system import System
 
 MOST_RUNS = 2  # looked at, those without which least is left of the others: each costs a fit for every kind of error
 LEAST_ODDS = 3.0  # in log odds: twenty to one that the record is wrong, before a run is corrected by it
+MOST_PAIRS = 3  # of runs that may both be wrong, those without which least is left of the others
+AS_LITTLE = 2.0  # times as much: one Gauss-Newton step does not tell them apart
 CLOSER = 3.0  # by which a fit is expected to come nearer: what its error is counted in while it runs
 MOST_LEFT = 2.0  # noises that the model with the error leaves: of one that leaves more no record is said to be wrong
 MOST_SHARES = (
@@ -160,9 +162,9 @@ class Beside:
         )
 
     def in_two_runs(self, singly: Sequence[Fit], error: float) -> list[Fit]:
-        """Errors in two runs at once, where much less is left without these two than without any other two; `error` of an independent sample, SI.
+        """Errors in two runs at once, where much less is left without some two than with them; `error` of an independent sample, SI.
 
-        The likeliest one of either run, beside it all of the other run, and beside the likeliest of these all of the first.
+        The likeliest single error of the runs in question, beside it all of the others that may be the second, and beside the likeliest of these all of the first run.
         """
         noise = float(self.setting.problem.noise_sigma)
         if self.joint.problem.batch.runs < LEAST_RUNS_OF_TWO or self._before < NEAR_NOISE * noise:
@@ -170,16 +172,20 @@ class Beside:
         left = left_without(self.setting, self.host, 2)
         if not left.stands_out:
             return []
-        names = [name for run in left.groups[0] for name in self._of(run)]
+        pairs = [
+            pair for pair, after in zip(left.groups, left.after, strict=True) if after <= AS_LITTLE * left.after[0]
+        ]
+        runs = dict.fromkeys(run for pair in pairs[:MOST_PAIRS] for run in pair)
         known = {fit.events[0].name: fit for fit in singly}
+        names = {name: run for run in runs for name in self._of(run)}
         fresh = [(name,) for name in names if name not in known]
         known |= {fit.events[0].name: fit for fit in self._fitted(fresh, self.joint.problem.start_values())}
         first = likeliest([known[name] for name in names], error)
         kept = first.events[0].name
-        others = [name for name in names if self.possible[name][1] != first.events[0].run]
-        second = self._fitted([(kept, name) for name in others], first.model.values)
+        beside = {run for pair in pairs[:MOST_PAIRS] if names[kept] in pair for run in pair} - {names[kept]}
+        second = self._fitted([(kept, name) for name, run in names.items() if run in beside], first.model.values)
         best = likeliest(second, error)
-        again = [name for name in names if name not in (kept, *others)]
+        again = [name for name, run in names.items() if run == names[kept] and name != kept]
         return [*second, *self._fitted([(best.events[1].name, name) for name in again], best.model.values)]
 
     @property
