@@ -13,24 +13,24 @@ only strong effects are added; the better the model, the finer the effects that 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from smajax.attribution.detectable_effects import detectable
 from smajax.attribution.exclusive_effects import in_another_way, of_groups, replaceable
-from smajax.attribution.fit_programs import grouped
 from smajax.attribution.fitted_sets import JointRound, JointSearch
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model
-from smajax.attribution.program_fits import MOST_WIDENED, BegunFit, comparison_settings, models_by_program
+from smajax.attribution.program_fits import BegunFit
 from smajax.attribution.round_cache import Asked, key_of_round, loaded_round, save_round
 from smajax.attribution.set_starts import at_usual_size, starts
+from smajax.attribution.side_by_side import fit_side_by_side, fitted_on, grouped_sets
 from smajax.attribution.subset_evidence import LinearModel, Subset, linear_model
 from smajax.attribution.traces import Traces, Variant, traces_at
-from smajax.core.progress import Stage
 from smajax.fit.outputs_of_runs import made_ready
 from smajax.fit.starts import nearest
 
+BEGINS = "fitting what the search begins with"
 USUAL_ROUNDS = "most searches end after 3 to 10"  # of the benchmark: 80 % of them, 6 in the median
 MOST_ROUNDS = 20  # the evidence rises in every one of them, so this only ends what should have ended
 FITTED = 4  # sets a round
@@ -53,14 +53,15 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
 
     Fills `search.fitted` and `search.rounds`.
     """
-    for program, its_sets in _grouped(search, starts):
+    for program, its_sets in grouped_sets(search, starts):
         for effects in its_sets:
             search.fitted[effects] = fitted_model(search.joint, effects, starts[effects], program)
     error = min(search.error(model) for model in search.fitted.values())
     # All to their end, however far behind: the base model is what every result is held against.
     begun = [BegunFit(effects, values, search.fitted[effects].width_factors) for effects, values in starts.items()]
-    _fit_side_by_side(search, begun, error, "fitting what the search begins with", compared=False)
-    present = search.best(error)
+    fit_side_by_side(search, begun, error, BEGINS, compared=False)
+    best = search.best(error)
+    present = fitted_on(search, best, search.error(best), BEGINS)
     error = search.error(present)
     checked: set[tuple[str, ...]] = set()  # models whose effects were removed and replaced one by one
     left: set[tuple[str, ...]] = set()  # models that were the likeliest before
@@ -81,7 +82,7 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
         last = present.effects in checked
         asked = _asked(search, present, error, _neighbours if last else _promising)
         if asked.begun:
-            _fit_side_by_side(search, asked.begun, error, _stage(search, number))
+            fit_side_by_side(search, asked.begun, error, _stage(search, number))
         best, before = search.best(error), present.log_evidence(error**2)
         gain = best.log_evidence(error**2) - before
         if best.effects in left - {present.effects} and gain < SETTLED_ODDS:
@@ -98,7 +99,7 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
         search.on_round(done)
         moved = best.effects != present.effects
         left |= {present.effects} if moved else set()
-        present = best
+        present = fitted_on(search, best, search.error(best), _stage(search, number))
         now = search.error(present)
         settled, error = abs(np.log(now / error)) < SETTLED, now
         alike = last and done.best_gain < SETTLED_ODDS
@@ -253,7 +254,7 @@ def _several_at_once(
     if not sets:
         return None
     begun = _begun(search, list(sets.values())[:AT_ONCE], linear, traces, level)
-    _fit_side_by_side(search, begun, level, _stage(search, number))
+    fit_side_by_side(search, begun, level, _stage(search, number))
     fitted = [search.fitted[effects] for effects in sets if effects in search.fitted]
     better = [one for one in fitted if one.rms < UNEXPLAINED * search.noise and search.error(one) < error]
     best = max(better, key=lambda one: _gain(search, present, one), default=None)
@@ -292,7 +293,7 @@ def _fit_alone(
         return [frozenset({one}) for effect, one in places.items() if effect in shown][:most]
 
     begun = _asked(search, search.fitted[()], error, alone, shown, most).begun
-    _fit_side_by_side(search, begun, error, _stage(search, len(search.rounds)), least_cost=least_cost)
+    fit_side_by_side(search, begun, error, _stage(search, len(search.rounds)), least_cost=least_cost)
 
 
 def _asked(
@@ -334,7 +335,7 @@ def _begun(
         return []
     joint = dataclasses.replace(search.joint, width_factors={**search.joint.width_factors, **linear.width_factors})
     begun: list[BegunFit] = []
-    groups = _grouped(search, [_effects(search, subset) for subset in sets])
+    groups = grouped_sets(search, [_effects(search, subset) for subset in sets])
     restricted = [joint.restricted(program) for program, _ in groups]
     made_ready([problem for problem, _ in restricted])
     for (_, its_sets), (problem, index) in zip(groups, restricted, strict=True):
@@ -348,53 +349,3 @@ def _begun(
                 usual = at_usual_size(joint, subset, traces, start)
                 begun.append(BegunFit(effects, usual, linear.width_factors))
     return begun
-
-
-def _fit_side_by_side(
-    search: JointSearch,
-    begun: Sequence[BegunFit],
-    error: float,
-    stage: str,
-    compared: bool = True,
-    least_cost: float = np.inf,
-) -> None:
-    """Fit sets of effects, those of one program side by side; the better of two fits of one set counts.
-
-    `compared`: those that fall far behind the others, or `least_cost` (of another model at this error), end early.
-    """
-    joint = search.joint
-    search.settings.progress(Stage(stage, 0.0))
-    settings = dataclasses.replace(comparison_settings(search.settings, stage), least_cost=least_cost)
-    if not compared:
-        settings = dataclasses.replace(settings, allowed_excess=(), promised_excess=None)
-    groups = [
-        (program, [one for one in begun if one.effects in its_sets])
-        for program, its_sets in _grouped(search, [one.effects for one in begun])
-    ]
-    search.trials |= {one.effects: error for one in begun}
-    for model in models_by_program(joint, groups, error, settings, MOST_WIDENED if compared else 0):
-        old = search.fitted.get(model.effects)
-        if old is None or model.log_evidence(error**2) > old.log_evidence(error**2):
-            search.fitted[model.effects] = model
-
-
-def _grouped(
-    search: JointSearch, sets: Iterable[tuple[str, ...]]
-) -> list[tuple[tuple[str, ...], list[tuple[str, ...]]]]:
-    """(effects that a program carries, sets that are fitted in it), and remember the programs."""
-    found = []
-    for union, its_sets in grouped(sets, search.programs):
-        program = search.joint.ordered(tuple(union))
-        search.programs = tuple(dict.fromkeys([*search.programs, program]))
-        found.append((program, its_sets))
-    return found
-
-
-def fitted_from(search: JointSearch, model: FittedModel) -> FittedModel:
-    """The effects of `model`, fitted with every free parameter of `search` from its values; `model` where that fit has no number."""
-    error = search.error(model)
-    stage = "fitting the base model with the values of presets free"
-    _fit_side_by_side(
-        search, [BegunFit(model.effects, model.values, model.width_factors)], error, stage, compared=False
-    )
-    return search.fitted.get(model.effects, model)

@@ -19,7 +19,6 @@ from smajax.attribution.input_of_run import FAR_LESS
 from smajax.attribution.joint_search import (
     MANY,
     fitted_alone,
-    fitted_from,
     likeliest_alone,
     search_jointly,
 )
@@ -27,6 +26,7 @@ from smajax.attribution.laplace_evidence import FittedModel, fitted_model
 from smajax.attribution.model_fits import Evidence, Model, Search
 from smajax.attribution.optimum import as_model, final_model, refined, with_no_effect_too_many
 from smajax.attribution.same_as_parameters import said_by_parameters
+from smajax.attribution.side_by_side import fitted_from
 from smajax.attribution.step_size_check import gain_kept_at_half_step
 from smajax.attribution.unknown.search import AskedFor, asked_for
 from smajax.attribution.unknown.terms import UNKNOWN
