@@ -104,7 +104,7 @@ def close_loop(  # keywords, which a caller names one by one
         interim(known_so_far(context, (outcome.search, outcome.base, outcome.final), Remaining.CHECKS))
     outcome, rejected = against_the_held_out_runs(context, outcome)
     outcome = against_an_outlier_run(context, against_an_unknown_term(context, outcome))
-    if leaves_little(context, outcome.final):
+    if leaves_little(context, outcome.final) or (outcome.lacking is not None and outcome.lacking.terms):
         context = replace(context, records=context.records.confirmed())
     found = findings_of(context, outcome, compare(context.job, context.setting, outcome.base, outcome.final), rejected)
     provenance = _provenance(experiment, cache, command, seed, clock.monotonic() - began)
@@ -162,7 +162,7 @@ def prepared(  # the stage's inputs, each once
     progress(Result(checks))
     context = Context(job, setting, start, base, seed, checks, interim, records)
     setting.after_round = None if interim is None else _now_and_then(context, interim)
-    if len(records.errors) < MOST_RECORD_ERRORS:
+    if records.asks and len(records.errors) < MOST_RECORD_ERRORS:
         setting.wrong_record = partial(
             record_errors, setting, runs=job.fit_runs, times_less=FAR_LESS, trials=records.may_try
         )
@@ -192,7 +192,7 @@ def with_records_corrected(context: Context, logged: Experiment | None = None) -
     """
     begun, logged = context, logged or context.job.experiment
     first = context, outcome = searched_finely(context)
-    while len(context.records.errors) < MOST_RECORD_ERRORS and (wrong := wrong_record(context, outcome)) is not None:
+    while (wrong := wrong_record(context, outcome)) is not None:
         context.setting.progress(Result(wrong))
         records = replace(context.records, errors=(*context.records.errors, *wrong.errors))
         context = _again(context, reduce(corrected, wrong.errors, context.job.experiment), records)
@@ -204,7 +204,8 @@ def with_records_corrected(context: Context, logged: Experiment | None = None) -
     if len(stand) == len(errors):
         return context, outcome
     context.setting.progress(Result(NotConfirmed(tuple(one for one in errors if one not in stand))))
-    records = CorrectedRecords(stand, trials=False)
+    # What was refused once may be found again by the next search, and no other one after that.
+    records = CorrectedRecords(stand, trials=False, asks=begun.records.trials)
     if first[1].search.wrong_record is None and stand == begun.records.errors:  # the first search had come to its end
         return replace(first[0], records=records), first[1]
     return with_records_corrected(_again(begun, reduce(corrected, stand, logged), records), logged)
@@ -250,6 +251,8 @@ def searched_finely(
 def wrong_record(context: Context, outcome: Outcome) -> FoundRecordErrors | None:
     """An input of one run that was recorded wrongly; asked where something is missing, if the search has not found one."""
     setting, base, final = context.setting, outcome.base, outcome.final
+    if setting.wrong_record is None:
+        return None
     if outcome.search.wrong_record is not None:
         return outcome.search.wrong_record
     if not final.effects and setting.is_noise(final):

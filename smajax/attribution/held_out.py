@@ -91,9 +91,8 @@ def _worse_than_base(compared: Compared, setting: Search) -> bool:
     if noise_like(compared[2], setting.config):
         return False
     held_out = [run for run in compared[0] if run.role == "held-out"]
-    mine = pooled_rms([left for run in held_out for left in run.residuals("after")])
-    theirs = pooled_rms([left for run in held_out for left in run.residuals("before")])
-    return mine > setting.config.held_out_worse * theirs
+    mine, theirs = ([left for run in held_out for left in run.residuals(which)] for which in ("after", "before"))
+    return bool(mine) and pooled_rms(mine) > setting.config.held_out_worse * pooled_rms(theirs)
 
 
 def _beside(new: Compared, old: Compared, setting: Search, which: Literal["before", "after"] = "after") -> Comparison:

@@ -57,9 +57,9 @@ def record_errors(
     names = [run.name for run in runs]
     sought = [one for host in hosts if (one := Beside.of(setting, host, names)) is not None]
     singly = [one.singly() for one in sought]
-    if not singly:
-        return None
     fits = [fit for its_fits in singly for fit in its_fits]
+    if not fits:
+        return None
     here = fitted_model(setting.joint(setting.candidates), present.effects, present.values, present.effects)
     compared = _Compared(here, float(setting.problem.noise_sigma), setting.noise_given, times_less, fits)
 
@@ -108,9 +108,9 @@ class _Compared:
         return [fit for fit in fits if fit.model.rms <= most and self.ahead(fit) >= LEAST_ODDS]
 
     def on_trial(self, fits: Sequence[Fit]) -> list[Fit]:
-        """Those that take most of what the base model leaves, and are likelier than the present model."""
-        beside_none = [fit for fit in fits if not fit.host.effects and fit.model.rms <= fit.before / ON_TRIAL]
-        return [fit for fit in beside_none if self.ahead(fit) >= LEAST_ODDS]
+        """Those that take most of what the base model leaves and leave more than noise, and are likelier than the present model."""
+        beside_none = [fit for fit in fits if not fit.host.effects and fit.model.rms > MOST_LEFT * self.noise]
+        return [fit for fit in beside_none if fit.model.rms <= fit.before / ON_TRIAL and self.ahead(fit) >= LEAST_ODDS]
 
 
 def _found(

@@ -125,10 +125,10 @@ class JointParameters:
         An effect that is off costs time in every step.
         """
         own = self.problem.system
-        fitted_ones = tuple(
+        fit_continuedes = tuple(
             one for one in own.effects if one.effect_name in effects or one.effect_name not in self.coefficients
         )
-        system = dataclasses.replace(own, effects=fitted_ones)
+        system = dataclasses.replace(own, effects=fit_continuedes)
         problem = self.problem.with_system(system, priors=self.prior_records(effects))
         return problem, np.asarray([self.slots[name] for name in problem.names])
 

@@ -24,7 +24,7 @@ from smajax.attribution.laplace_evidence import FittedModel, fitted_model
 from smajax.attribution.program_fits import BegunFit
 from smajax.attribution.round_cache import Asked, key_of_round, loaded_round, save_round
 from smajax.attribution.set_starts import at_usual_size, starts
-from smajax.attribution.side_by_side import fit_side_by_side, fitted_on, grouped_sets
+from smajax.attribution.side_by_side import LOOSELY, fit_continued, fit_side_by_side, grouped_sets
 from smajax.attribution.subset_evidence import LinearModel, Subset, linear_model
 from smajax.attribution.traces import Traces, Variant, traces_at
 from smajax.fit.outputs_of_runs import made_ready
@@ -60,8 +60,7 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
     # All to their end, however far behind: the base model is what every result is held against.
     begun = [BegunFit(effects, values, search.fitted[effects].width_factors) for effects, values in starts.items()]
     fit_side_by_side(search, begun, error, BEGINS, compared=False)
-    best = search.best(error)
-    present = fitted_on(search, best, search.error(best), BEGINS)
+    present = search.best(error)
     error = search.error(present)
     checked: set[tuple[str, ...]] = set()  # models whose effects were removed and replaced one by one
     left: set[tuple[str, ...]] = set()  # models that were the likeliest before
@@ -69,6 +68,8 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
     widened: set[tuple[str, ...]] = set()  # models beside which several effects at once were tried
     shapes: set[tuple[str, ...]] = set()  # effects of groups of these, and of what was searched around in their place
     for number in range(MOST_ROUNDS):
+        present = fit_continued(search, present, error, _stage(search, number) if number else BEGINS)
+        error = search.error(present)
         if len(present.effects) >= MANY and search.has_wrong_record(present):
             break
         if present.effects in checked or any(len(effects) >= MANY for effects in left):
@@ -99,10 +100,10 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
         search.on_round(done)
         moved = best.effects != present.effects
         left |= {present.effects} if moved else set()
-        present = fitted_on(search, best, search.error(best), _stage(search, number))
+        present = best
         now = search.error(present)
+        alike = last and done.best_gain < SETTLED_ODDS and now > error / LOOSELY
         settled, error = abs(np.log(now / error)) < SETTLED, now
-        alike = last and done.best_gain < SETTLED_ODDS
         if alike or (not moved and settled):
             explained = not present.effects and error < UNEXPLAINED * search.noise
             if explained or not search.thorough:

@@ -30,10 +30,11 @@ class FoundRecordErrors(NamedTuple):
 
 @dataclass(frozen=True)
 class CorrectedRecords:
-    """Records of single runs that are corrected in an experiment. `trials`: whether some may be on trial."""
+    """Records of single runs that are corrected in an experiment. `trials`: whether some may be on trial; `asks`: whether others are looked for."""
 
     errors: tuple[RecordError, ...] = ()
     trials: bool = True
+    asks: bool = True
 
     @property
     def may_try(self) -> bool:

@@ -180,10 +180,15 @@ class Beside:
         names = {name: run for run in runs for name in self._of(run)}
         fresh = [(name,) for name in names if name not in known]
         known |= {fit.events[0].name: fit for fit in self._fitted(fresh, self.joint.problem.start_values())}
-        first = likeliest([known[name] for name in names], error)
+        tried = [known[name] for name in names if name in known]
+        if not tried:
+            return []
+        first = likeliest(tried, error)
         kept = first.events[0].name
         beside = {run for pair in pairs[:MOST_PAIRS] if names[kept] in pair for run in pair} - {names[kept]}
         second = self._fitted([(kept, name) for name, run in names.items() if run in beside], first.model.values)
+        if not second:
+            return []
         best = likeliest(second, error)
         again = [name for name, run in names.items() if run == names[kept] and name != kept]
         return [*second, *self._fitted([(best.events[1].name, name) for name in again], best.model.values)]
@@ -226,6 +231,8 @@ class Beside:
         settings = replace(settings, allowed_excess=excess, least_cost=0.0, promised_excess=None, one_of_each=0)
         found = []
         for names, fit in zip(sets, levenberg_marquardt(problem, tasks, settings), strict=True):
+            if not np.isfinite(fit.cost):
+                continue
             events = [
                 Event(self.possible[name][0].coefficient, self.possible[name][1], float(fit.values[joint.slots[name]]))
                 for name in names

@@ -64,7 +64,7 @@ def fitted_from(search: JointSearch, model: FittedModel) -> FittedModel:
     return search.fitted.get(model.effects, model)
 
 
-def fitted_on(search: JointSearch, model: FittedModel, error: float, stage: str) -> FittedModel:
+def fit_continued(search: JointSearch, model: FittedModel, error: float, stage: str) -> FittedModel:
     """`model` fitted on where its fit ended at an error of a sample of more than `LOOSELY` times `error`, beside which its last steps were nothing; SI.
 
     Any set that is fitted anew at the smaller error would be likelier than it by what it still had to come to.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib import import_module, resources
 from types import SimpleNamespace
 from typing import Any, cast
@@ -16,6 +16,7 @@ import pytest
 from smajax.attribution import record_fits
 from smajax.attribution.close_loop import close_loop
 from smajax.attribution.context import Context, Outcome
+from smajax.attribution.doubtful_runs import Left
 from smajax.attribution.findings import Findings
 from smajax.attribution.input_of_run import FAR_LESS, corrected, record_errors, standing
 from smajax.attribution.job import job_of
@@ -29,7 +30,7 @@ from smajax.attribution.record_error import (
     NotConfirmed,
     RecordError,
 )
-from smajax.attribution.record_fits import Beside
+from smajax.attribution.record_fits import KINDS, Beside, Event, Fit, likeliest
 from smajax.core.parameters import parameter_values, parameters
 from smajax.core.progress import Result
 from smajax.core.result_cache import ResultCache
@@ -193,12 +194,50 @@ def test_records_that_are_wrong_in_two_runs_are_named_together(
         assert one.standard_error < 0.02 * abs(right)
 
 
+def test_the_second_record_is_sought_in_every_run_without_which_about_as_little_is_left(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """One Gauss-Newton step does not say which of them it is."""
+    level, load = KINDS[2:]
+    possible = {f"{kind.coefficient}[{run}]": (kind, run) for run in "abcde" for kind in (level, load)}
+    batch = SimpleNamespace(runs=5, mask=np.ones((5, 4)))
+    problem = SimpleNamespace(batch=batch, per_run=SimpleNamespace(runs=tuple("abcde")), start_values=lambda: None)
+    setting = SimpleNamespace(problem=SimpleNamespace(noise_sigma=0.1))
+    host = Model((), np.zeros(1), 1.0, np.zeros((5, 4)), 1.0)
+    beside = Beside(cast(Any, setting), host, cast(Any, SimpleNamespace(problem=problem)), possible, np.ones((5, 4)))
+    wrong = {"input_level.gain[e]", "wrong_load.share[d]"}
+    tried: list[tuple[str, ...]] = []
+
+    def fitted(_: Beside, sets: Sequence[tuple[str, ...]], values: object) -> list[Fit]:
+        tried.extend(sets)
+        fits = []
+        for names in sets:
+            likely = float(
+                len(wrong & set(names))
+                - 0.1 * len(names)
+                + 0.5 * (wrong.intersection(names) == {"input_level.gain[e]"})
+            )
+            model = SimpleNamespace(log_evidence=lambda _, likely=likely: likely, values=None)
+            fits.append(Fit(host, tuple(Event(*name[:-1].split("["), 0.1) for name in names), cast(Any, model), 1.0))
+        return fits
+
+    groups = ((2, 4), (3, 4), (0, 1))
+    left = Left(groups, np.full(3, 10.0), np.asarray([1.0, 1.5, 9.0]), 0.1)
+    monkeypatch.setattr(record_fits, "left_without", lambda *_: left)
+    monkeypatch.setattr(Beside, "_fitted", fitted)
+    found = likeliest(beside.in_two_runs([], 1.0), 1.0)
+    assert {event.name for event in found.events} == wrong
+    pairs = {frozenset(one) for one in tried if len(one) == 2}
+    assert {name[-2] for pair in pairs for name in pair} == set("cde")  # a and b leave nine times as much
+    assert all(any(name.endswith("[e]") for name in pair) for pair in pairs)
+
+
 def _loop_with_a_trial(
-    monkeypatch: pytest.MonkeyPatch, left: float, needed: bool, ended: bool
+    monkeypatch: pytest.MonkeyPatch, left: float, needed: bool, ended: bool, again: bool = False
 ) -> tuple[Context, list[tuple[int, bool]], list[object]]:
     """(final context, records corrected and whether trials are allowed in each search, what was said), of a search that leaves so many noises beside a record on trial.
 
-    `ended`: whether the record was asked for when the first search had come to its end.
+    `ended`: whether the record was asked for when the first search had come to its end; `again`: whether the next search finds it too, and not on trial.
     """
     experiment = _demo("complete")
     tried = dataclasses.replace(FOUND, on_trial=True)
@@ -217,12 +256,16 @@ def _loop_with_a_trial(
         asked.append((len(context.records.errors), context.records.trials))
         noises = left if context.records.errors else 50.0
         model = Model((), np.zeros(1), samples * noises**2, np.zeros((1, 1)), 0.0)
-        asks = not ended and not context.records.errors and context.records.trials
+        asks = not ended and not context.records.errors and context.records.asks
         search = SimpleNamespace(wrong_record="a record" if asks else None)
         return context, Outcome(cast(Any, search), model, model)
 
     def wrong(context: Context, _: Outcome) -> FoundRecordErrors | None:
-        return FoundRecordErrors((tried,), ()) if context.records.may_try else None
+        records = context.records
+        if records.may_try:
+            return FoundRecordErrors((tried,), ())
+        found = again and records.asks and not records.errors
+        return FoundRecordErrors((dataclasses.replace(tried, on_trial=False),), ()) if found else None
 
     def standing(errors: tuple[RecordError, ...], *_: object) -> tuple[RecordError, ...]:
         return errors if needed else ()
@@ -234,7 +277,9 @@ def _loop_with_a_trial(
         ("standing", standing),
     ):
         monkeypatch.setattr(loop, name, instead)
-    final, _ = loop.with_records_corrected(context(experiment))
+    final, outcome = loop.with_records_corrected(context(experiment))
+    # The models are of the runs as the final context has them.
+    assert outcome.final.cost == samples * (left if final.records.errors else 50.0) ** 2
     logged = final.records.errors == ()
     assert (final.job.experiment is experiment) is logged
     return final, asked, [one.record for one in said if isinstance(one, Result)]
@@ -264,6 +309,12 @@ def test_a_record_that_does_not_stand_is_taken_as_it_was_logged(
     assert asked == [(0, True), (1, True)] + [(0, False)] * (not ended)
     last = what_is_searched(cast(NotConfirmed, said[-1]))
     assert last.startswith("no model that leaves little more than noise needs the voltage of steps corrected")
+
+
+def test_what_is_found_and_refused_again_is_not_looked_for_any_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    final, asked, _ = _loop_with_a_trial(monkeypatch, 1.0, needed=False, ended=False, again=True)
+    assert final.records == CorrectedRecords((), trials=False, asks=False)
+    assert asked == [(0, True), (1, True), (0, False), (1, False), (0, False)]
 
 
 def test_an_error_that_is_none_beside_what_was_found_later_does_not_stand() -> None:
