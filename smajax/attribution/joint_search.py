@@ -100,8 +100,7 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
         search.on_round(done)
         moved = best.effects != present.effects
         left |= {present.effects} if moved else set()
-        present = best
-        now = search.error(present)
+        present, now = best, search.error(best)
         alike = last and done.best_gain < SETTLED_ODDS and now > error / LOOSELY
         settled, error = abs(np.log(now / error)) < SETTLED, now
         if alike or (not moved and settled):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from smajax.attribution import fitted_sets, joint_search, subset_evidence, traces
+from smajax.attribution import fitted_sets, joint_search, side_by_side, subset_evidence, traces
 from smajax.attribution.detectable_effects import detectable
 from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.joint_parameters import JointParameters, residual_and_columns
@@ -153,7 +153,7 @@ def test_an_effect_that_is_not_needed_at_the_optimum_without_it_is_not_kept() ->
 def test_a_set_whose_fits_have_no_number_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     """The search goes on among the others; it ended in a KeyError."""
     monkeypatch.setattr(
-        joint_search,
+        side_by_side,
         "models_by_program",
         lambda *given: (model for model in models_by_program(*given) if "phase_resistance" not in model.effects),
     )
@@ -385,8 +385,8 @@ def test_two_models_that_are_as_likely_do_not_take_turns(monkeypatch: pytest.Mon
     search.settings = FitSettings()
     search.fitted = {one.effects: one, other.effects: other}
     monkeypatch.setattr(fitted_sets, "independent_error", lambda model, *_: model.rms)
-    monkeypatch.setattr(joint_search, "_grouped", lambda *_: [])
-    monkeypatch.setattr(joint_search, "_fit_side_by_side", lambda *_, **__: None)
+    monkeypatch.setattr(joint_search, "grouped_sets", lambda *_: [])
+    monkeypatch.setattr(joint_search, "fit_side_by_side", lambda *_, **__: None)
     monkeypatch.setattr(joint_search, "_linear", lambda *_: (None, None))
     monkeypatch.setattr(joint_search, "_several_at_once", lambda *_: None)
     for name in ("_neighbours", "_promising"):

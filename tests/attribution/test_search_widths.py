@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from smajax.attribution import joint_search
+from smajax.attribution import joint_search, side_by_side
 from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.joint_search import search_jointly
 from smajax.attribution.laplace_evidence import fitted_model
@@ -87,7 +87,7 @@ def test_fits_of_a_round_begin_with_the_widths_of_the_linear_model(monkeypatch: 
         begun.extend(one for _, its_sets in groups for one in its_sets)
         return models_by_program(joint, groups, *given)
 
-    monkeypatch.setattr(joint_search, "models_by_program", recorded)
+    monkeypatch.setattr(side_by_side, "models_by_program", recorded)
     search = _with_narrow_priors(hot_weight({"latent_heat.enthalpy": 1.2e4}), 64.0)
     search_jointly(search, {(): search.joint.problem.start_values()})
     fits = [one for one in begun if one.effects == ("latent_heat",)]
