@@ -38,17 +38,17 @@ class Left(NamedTuple):
         return bool(little.any() or self.after[0] < BESIDE_OTHERS * self.after[1])
 
 
-def left_without(
-    setting: Search, model: Model | FittedModel, together: int = 1, program: Sequence[str] | None = None
-) -> Left:
-    """`model` without each run, or each `together` runs, values of presets free as they are beside a record that is corrected.
+def left_without(setting: Search, model: Model | FittedModel, program: Sequence[str] | None = None) -> tuple[Left, ...]:
+    """`model` without each run, and of `LEAST_RUNS_OF_TWO` or more without each two, values of presets free as they are beside a record that is corrected.
 
     `program`: effects of the program that computes it; None: the model's own.
     """
     joint = setting.joint(setting.candidates)
     program = model.effects if program is None else program
     here = fitted_model(joint, model.effects, model.values, program)
-    noise = float(setting.problem.noise_sigma)
-    groups, before, after = left_of_the_others(joint, here, max(noise, here.rms), program, together)
-    order = np.argsort(after, kind="stable")
-    return Left(tuple(groups[k] for k in order), before[order], after[order], noise)
+    noise, most = float(setting.problem.noise_sigma), 2 if setting.problem.batch.runs >= LEAST_RUNS_OF_TWO else 1
+    found = []
+    for groups, before, after in left_of_the_others(joint, here, max(noise, here.rms), program, most):
+        order = np.argsort(after, kind="stable")
+        found.append(Left(tuple(groups[k] for k in order), before[order], after[order], noise))
+    return tuple(found)

@@ -22,7 +22,17 @@ from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model, independent_error
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.record_error import FoundRecordErrors, RecordError
-from smajax.attribution.record_fits import KINDS, LEAST_ODDS, MOST_LEFT, Beside, Fit, Host, likeliest, log_odds, needed
+from smajax.attribution.record_fits import (
+    LEAST_ODDS,
+    MOST_LEFT,
+    Beside,
+    Fit,
+    Host,
+    kind_of,
+    likeliest,
+    log_odds,
+    needed,
+)
 from smajax.core.names_of_runs import of_run
 from smajax.core.parameters import parameters
 from smajax.data.experiment.record import Experiment, Prior, Run, Unknown
@@ -143,11 +153,10 @@ def corrected(experiment: Experiment, found: RecordError) -> Experiment:
 
     Its size in that run is an unknown that begins at what was found.
     """
-    kind = next(one for one in KINDS if one.coefficient == found.coefficient)
     table = parameters(with_effects(base_model(experiment), [found.coefficient.split(".")[0]]))
     about = table[found.coefficient]
     low, high = min(about.low, found.value), max(about.high, found.value)
-    prior = Prior(0.0, kind.sigma, False)
+    prior = Prior(0.0, kind_of(found.coefficient).sigma, False)
     unknown = Unknown(found.coefficient, about.unit, low, high, found.value, True, prior, (found.run,))
     return replace(
         experiment,

@@ -125,10 +125,10 @@ class JointParameters:
         An effect that is off costs time in every step.
         """
         own = self.problem.system
-        fit_continuedes = tuple(
+        fitted_ones = tuple(
             one for one in own.effects if one.effect_name in effects or one.effect_name not in self.coefficients
         )
-        system = dataclasses.replace(own, effects=fit_continuedes)
+        system = dataclasses.replace(own, effects=fitted_ones)
         problem = self.problem.with_system(system, priors=self.prior_records(effects))
         return problem, np.asarray([self.slots[name] for name in problem.names])
 

@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from smajax.attribution.doubtful_runs import LEAST_RUNS_OF_TWO, left_without
+from smajax.attribution.doubtful_runs import left_without
 from smajax.attribution.exclusive_effects import replaceable
 from smajax.attribution.findings import LikelierModel, NoLikelierModel, Reason, Round, StepDependent
 from smajax.attribution.fitted_sets import JointRound, JointSearch
@@ -163,8 +163,7 @@ class _Stage:
         programs = [search.joint.ordered(one) for one in search.programs]
         fitting = [one for one in programs if set(model.effects) <= set(one)]
         program = min(fitting, key=len, default=model.effects)
-        most = 2 if self.setting.problem.batch.runs >= LEAST_RUNS_OF_TWO else 1
-        return any(left_without(self.setting, model, count, program).stands_out for count in range(1, most + 1))
+        return any(left.stands_out for left in left_without(self.setting, model, program))
 
     def before_the_end(self, search: JointSearch, found: FittedModel) -> FittedModel | None:
         """One effect that is likelier than those of `found`, in an equation where an unknown function is likelier than these too."""

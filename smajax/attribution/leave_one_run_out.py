@@ -70,27 +70,30 @@ def left_out(joint: JointParameters, model: FittedModel, error: float, program: 
 
 
 def left_of_the_others(
-    joint: JointParameters, model: FittedModel, error: float, program: Sequence[str], together: int = 1
-) -> tuple[list[tuple[int, ...]], np.ndarray, np.ndarray]:
+    joint: JointParameters, model: FittedModel, error: float, program: Sequence[str], most: int = 1
+) -> list[tuple[list[tuple[int, ...]], np.ndarray, np.ndarray]]:
     """(runs that are left out, root mean squares of what `model` leaves of the others, and of what it would leave fitted to them alone, by one Gauss-Newton step).
 
-    Each run in turn, or each `together` runs. `error` and `program` as of `left_out`; SI.
+    Each run in turn, each two, and so on up to `most` at once. `error` and `program` as of `left_out`; SI.
     """
     problem, index = joint.restricted(program)
     problem = problem.with_noise(error)
     gram, gradient, misfit = _normal_equations(problem, model, model.values[index])
     squares, samples = problem.by_run(misfit**2).sum(axis=1), problem.by_run(np.asarray(problem.batch.mask)).sum(axis=1)
-    groups = list(itertools.combinations(range(problem.batch.runs), together))
-    before, after = [], []
-    for gone in groups:
-        other = ~np.isin(problem.owner, gone)
-        stay = [run for run in range(problem.batch.runs) if run not in gone]
-        count, left = samples[stay].sum(), squares[stay].sum()
-        others, slope = gram[other].sum(axis=0), gradient[other].sum(axis=0)
-        step = np.linalg.solve(others + np.diag(model.precision), slope)
-        before.append(left / count)
-        after.append(max(left - 2.0 * float(step @ slope) + float(step @ others @ step), 0.0) / count)
-    return groups, error * np.sqrt(before), error * np.sqrt(after)
+    found = []
+    for together in range(1, most + 1):
+        groups = list(itertools.combinations(range(problem.batch.runs), together))
+        before, after = [], []
+        for gone in groups:
+            other = ~np.isin(problem.owner, gone)
+            stay = [run for run in range(problem.batch.runs) if run not in gone]
+            count, left = samples[stay].sum(), squares[stay].sum()
+            others, slope = gram[other].sum(axis=0), gradient[other].sum(axis=0)
+            step = np.linalg.solve(others + np.diag(model.precision), slope)
+            before.append(left / count)
+            after.append(max(left - 2.0 * float(step @ slope) + float(step @ others @ step), 0.0) / count)
+        found.append((groups, error * np.sqrt(before), error * np.sqrt(after)))
+    return found
 
 
 def predicting(

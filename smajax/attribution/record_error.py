@@ -56,7 +56,7 @@ NO_RECORDS = CorrectedRecords()
 
 @dataclass(frozen=True)
 class NotConfirmed:
-    """Records that were corrected on trial, beside which no model came down to noise; they are taken as they were logged again."""
+    """Records that were corrected and do not stand: no model found beside them needs them and, where they were on trial, comes down to noise. They are taken as they were logged."""
 
     errors: tuple[RecordError, ...]
 

@@ -9,12 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.attribution.doubtful_runs import LEAST_RUNS_OF_TWO, NEAR_NOISE, left_without
+from smajax.attribution.doubtful_runs import NEAR_NOISE, Left, left_without
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model
 from smajax.attribution.model_fits import Model, Search
@@ -68,6 +69,11 @@ KINDS = (
 )
 
 
+def kind_of(coefficient: str) -> Kind:
+    """The way in which a record is wrong that has this coefficient."""
+    return next(kind for kind in KINDS if kind.coefficient == coefficient)
+
+
 @dataclass(frozen=True)
 class _EventParameters(JointParameters):
     """Those of a model with one value of one run's own; its problem is whole already."""
@@ -106,7 +112,7 @@ def log_odds(coefficient: str, value: float, standard_error: float, runs: int) -
     By the density ratio of Savage and Dickey (Dickey 1971) with the posterior taken as normal: $z^2/2 + \ln(s/\sigma)$ with $z = v/s$, value over standard error, and the prior's $\sigma$; and the
     prior odds. A model fitted with an error of a record has the values of presets free as well, and these alone may explain what is missing.
     """
-    sigma = next(kind.sigma for kind in KINDS if kind.coefficient == coefficient)
+    sigma = kind_of(coefficient).sigma
     return 0.5 * (value / standard_error) ** 2 + math.log(standard_error / sigma) + _prior_odds(runs)
 
 
@@ -156,7 +162,7 @@ class Beside:
 
     def singly(self) -> list[Fit]:
         """Each kind of error in each of the runs without which the host leaves least of the others."""
-        doubtful = left_without(self.setting, self.host).groups[:MOST_RUNS]
+        doubtful = self._without[0].groups[:MOST_RUNS]
         return self._fitted(
             [(name,) for (run,) in doubtful for name in self._of(run)], self.joint.problem.start_values()
         )
@@ -167,9 +173,9 @@ class Beside:
         The likeliest single error of the runs in question, beside it all of the others that may be the second, and beside the likeliest of these all of the first run.
         """
         noise = float(self.setting.problem.noise_sigma)
-        if self.joint.problem.batch.runs < LEAST_RUNS_OF_TWO or self._before < NEAR_NOISE * noise:
+        if len(self._without) < 2 or self._before < NEAR_NOISE * noise:
             return []
-        left = left_without(self.setting, self.host, 2)
+        left = self._without[1]
         if not left.stands_out:
             return []
         pairs = [
@@ -193,7 +199,12 @@ class Beside:
         again = [name for name, run in names.items() if run == names[kept] and name != kept]
         return [*second, *self._fitted([(best.events[1].name, name) for name in again], best.model.values)]
 
-    @property
+    @cached_property
+    def _without(self) -> tuple[Left, ...]:
+        """What the host leaves of the other runs without each run, and without each two."""
+        return left_without(self.setting, self.host)
+
+    @cached_property
     def _before(self) -> float:
         """What the host leaves, root mean square, SI."""
         return float(np.sqrt((self.left**2).sum() / np.asarray(self.joint.problem.batch.mask).sum()))

@@ -58,10 +58,7 @@ def grouped_sets(
 
 def fitted_from(search: JointSearch, model: FittedModel) -> FittedModel:
     """The effects of `model`, fitted with every free parameter of `search` from its values; `model` where that fit has no number."""
-    error = search.error(model)
-    stage = "fitting the base model with the values of presets free"
-    fit_side_by_side(search, [BegunFit(model.effects, model.values, model.width_factors)], error, stage, compared=False)
-    return search.fitted.get(model.effects, model)
+    return _to_its_end(search, model, search.error(model), "fitting the base model with the values of presets free")
 
 
 def fit_continued(search: JointSearch, model: FittedModel, error: float, stage: str) -> FittedModel:
@@ -70,8 +67,13 @@ def fit_continued(search: JointSearch, model: FittedModel, error: float, stage: 
     Any set that is fitted anew at the smaller error would be likelier than it by what it still had to come to.
     """
     while search.trials.get(model.effects, 0.0) > LOOSELY * error:
-        begun = BegunFit(model.effects, model.values, model.width_factors)
-        fit_side_by_side(search, [begun], error, stage, compared=False)
-        model = search.fitted[model.effects]
+        model = _to_its_end(search, model, error, stage)
         error = search.error(model)
     return model
+
+
+def _to_its_end(search: JointSearch, model: FittedModel, error: float, stage: str) -> FittedModel:
+    """The effects of `model` fitted from its values at this error of a sample, SI."""
+    begun = BegunFit(model.effects, model.values, model.width_factors)
+    fit_side_by_side(search, [begun], error, stage, compared=False)
+    return search.fitted.get(model.effects, model)

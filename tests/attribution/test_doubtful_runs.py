@@ -38,7 +38,7 @@ def test_two_runs_whose_levels_are_wrong_stand_out_together_and_neither_alone() 
     setting = Search(problem, UNKNOWNS, joint.bounds, ("latent_heat",), ResultCache())
     (fit,), _ = setting.fit([Start((), problem.start_values())], "a fit", settled=1e-3)
     base = Model((), fit.values, fit.cost, np.zeros(volts.shape), 0.0)
-    singly, in_twos = (left_without(setting, base, together) for together in (1, 2))
+    singly, in_twos = left_without(setting, base)
     assert not singly.stands_out
     assert in_twos.stands_out
     assert in_twos.groups[0] == (1, 4)

@@ -148,7 +148,7 @@ def test_without_a_run_whose_record_is_wrong_little_is_left_of_the_others() -> N
     joint = setting.joint(setting.candidates)
     noise = float(setting.problem.noise_sigma)
     model = fitted_model(joint, (), base.values, ())
-    groups, before, after = left_of_the_others(joint, model, noise, ())
+    ((groups, before, after),) = left_of_the_others(joint, model, noise, ())
     assert groups == [(run,) for run in range(len(runs))]
     assert before.shape == after.shape == (len(runs),)
     assert after[0] < 0.3 * before[0]

@@ -126,7 +126,7 @@ def test_the_second_record_is_sought_in_every_run_without_which_about_as_little_
 
     groups = ((2, 4), (3, 4), (0, 1))
     left = Left(groups, np.full(3, 10.0), np.asarray([1.0, 1.5, 9.0]), 0.1)
-    monkeypatch.setattr(record_fits, "left_without", lambda *_: left)
+    monkeypatch.setattr(record_fits, "left_without", lambda *_: (left, left))
     monkeypatch.setattr(Beside, "_fitted", fitted)
     found = likeliest(beside.in_two_runs([], 1.0), 1.0)
     assert {event.name for event in found.events} == wrong
