@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from importlib import import_module, resources
+from importlib import import_module
 
 import jax
 import jax.numpy as jnp
@@ -21,20 +21,18 @@ from smajax.attribution.leave_one_run_out import left_of_the_others
 from smajax.attribution.model_fits import Model, Search, Start
 from smajax.attribution.record_error import (
     FoundRecordErrors,
-    RecordError,
 )
 from smajax.attribution.record_fits import Beside
 from smajax.core.parameters import parameter_values, parameters
 from smajax.core.result_cache import ResultCache
-from smajax.data.experiment.load import load_experiment
-from smajax.data.experiment.record import Experiment, Run
-from smajax.data.model_catalogue import CATALOGUE
+from smajax.data.experiment.record import Run
 from smajax.fit.base_model import base_model
 from smajax.fit.experiment_problem import free_by_name, own_values
 from smajax.fit.preset_priors import preset_priors
 from smajax.report.narrative.record_errors import of_wrong_records, what_was_wrong
 from tests.helpers.hot_weight import DT, SAMPLES, UNKNOWNS, hot_weight
 from tests.helpers.made_findings import made_findings
+from tests.helpers.wrong_records import FOUND, demo, early
 
 loop = import_module("smajax.attribution.close_loop")
 NAMES = ("first", "second", "third", "fourth")
@@ -65,15 +63,10 @@ def _searched(
     return setting, base, extended, runs
 
 
-def _early(volts: jax.Array) -> jax.Array:
-    """Written down 0.6 s before it acted."""
-    return jnp.concatenate([volts[6:], jnp.full(6, volts[-1])])
-
-
 @pytest.mark.parametrize(
     ("truth", "wrong", "run", "coefficient", "value"),
     [
-        ({}, _early, 0, "input_delay.delay", 0.6),
+        ({}, early, 0, "input_delay.delay", 0.6),
         ({}, lambda volts: volts / 1.05, 3, "input_level.gain", 0.05),  # the fit leaves more of every other run
         pytest.param(
             {"latent_heat.enthalpy": 1.2e4},
@@ -101,7 +94,7 @@ def test_a_wrong_record_is_named_with_its_run_and_size(
 
 
 def test_where_every_record_is_right_none_is_named() -> None:
-    setting, base, extended, runs = _searched({"latent_heat.enthalpy": 1.2e4}, _early, None)
+    setting, base, extended, runs = _searched({"latent_heat.enthalpy": 1.2e4}, early, None)
     assert record_errors(setting, (base, extended), extended, runs) is None
     assert record_errors(setting, (base,), base, runs[:2]) is None  # of two that disagree either may be wrong
 
@@ -130,7 +123,7 @@ def test_no_record_is_wrong_where_the_values_of_presets_are() -> None:
 @pytest.mark.slow
 def test_no_record_is_wrong_where_more_is_missing() -> None:
     """A sensor whose zero drifts in all runs, which nothing that is looked at explains: the error of the record would take its part of it."""
-    setting, base, extended, runs = _searched({}, _early, 0)
+    setting, base, extended, runs = _searched({}, early, 0)
     assert record_errors(setting, (base, extended), extended, runs) is not None
     drift = 20.0 * float(setting.problem.noise_sigma) * np.sin(np.linspace(0.0, 9.0, SAMPLES))
     problem = setting.problem.with_output(jnp.asarray(setting.problem.measured + drift))
@@ -138,13 +131,13 @@ def test_no_record_is_wrong_where_more_is_missing() -> None:
 
 
 def test_before_a_search_has_ended_the_model_with_the_error_has_to_leave_far_less() -> None:
-    setting, base, extended, runs = _searched({}, _early, 0)
+    setting, base, extended, runs = _searched({}, early, 0)
     assert record_errors(setting, (base, extended), extended, runs, FAR_LESS) is not None
     assert record_errors(setting, (base, extended), extended, runs, 1e3) is None
 
 
 def test_without_a_run_whose_record_is_wrong_little_is_left_of_the_others() -> None:
-    setting, base, _, runs = _searched({}, _early, 0)
+    setting, base, _, runs = _searched({}, early, 0)
     joint = setting.joint(setting.candidates)
     noise = float(setting.problem.noise_sigma)
     model = fitted_model(joint, (), base.values, ())
@@ -155,16 +148,8 @@ def test_without_a_run_whose_record_is_wrong_little_is_left_of_the_others() -> N
     assert (after[1:] > 0.5 * before[1:]).all()
 
 
-def _demo(which: str) -> Experiment:
-    with resources.as_file(resources.files("smajax") / "data" / "demo" / which) as folder:
-        return load_experiment(folder / "experiment.toml", CATALOGUE)
-
-
-FOUND = RecordError("steps", "voltage", "input_delay.delay", 0.8, 1e-3, 50.0, ("draught",), 60.0)
-
-
 def test_a_corrected_run_has_the_value_and_all_others_have_none() -> None:
-    experiment = corrected(_demo("complete"), FOUND)
+    experiment = corrected(demo(), FOUND)
     assert experiment.declared_effects == ("input_delay",)
     (effect,) = base_model(experiment).effects
     assert float(effect.delay) == 0.0
@@ -178,7 +163,7 @@ def test_a_corrected_run_has_the_value_and_all_others_have_none() -> None:
 
 
 def test_two_runs_may_each_have_an_error_of_one_kind() -> None:
-    experiment = corrected(corrected(_demo("complete"), FOUND), dataclasses.replace(FOUND, run="triangle", value=-0.3))
+    experiment = corrected(corrected(demo(), FOUND), dataclasses.replace(FOUND, run="triangle", value=-0.3))
     assert experiment.declared_effects == ("input_delay",)
     fit_runs = [run for run in experiment.runs if run.role == "fit"]
     free = free_by_name(experiment, fit_runs)
@@ -191,7 +176,7 @@ def test_two_runs_may_each_have_an_error_of_one_kind() -> None:
 
 
 def test_an_error_of_a_kind_that_was_corrected_is_sought_in_the_other_runs(monkeypatch: pytest.MonkeyPatch) -> None:
-    job = job_of(corrected(_demo("complete"), FOUND))
+    job = job_of(corrected(demo(), FOUND))
     setting = Search(job.problem, job.unknowns, job.bounds, (), ResultCache())
     host = Model((), job.problem.start_values(), 1.0, np.zeros(job.problem.measured.shape), 1.0)
     names = [run.name for run in job.fit_runs]
@@ -234,7 +219,7 @@ def test_the_page_says_what_the_record_should_have_been() -> None:
 
 
 def _loop_with_a_late_run(*only: str) -> Findings:
-    experiment = _demo("complete")
+    experiment = demo()
     late = round(0.8 / experiment.step)
 
     def wrong(run: Run) -> Run:

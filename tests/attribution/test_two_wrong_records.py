@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from importlib import import_module, resources
+from importlib import import_module
 from types import SimpleNamespace
 from typing import Any, cast
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -28,24 +27,12 @@ from smajax.attribution.record_error import (
 from smajax.attribution.record_fits import KINDS, Beside, Event, Fit, likeliest
 from smajax.core.progress import Result
 from smajax.core.result_cache import ResultCache
-from smajax.data.experiment.load import load_experiment
 from smajax.data.experiment.record import Experiment, Run
-from smajax.data.model_catalogue import CATALOGUE
 from smajax.report.narrative.record_errors import what_is_searched
 from tests.helpers.hot_weight import DT, SAMPLES, UNKNOWNS, VOLTS, hot_weight
+from tests.helpers.wrong_records import FOUND, demo, early
 
 loop = import_module("smajax.attribution.close_loop")
-FOUND = RecordError("steps", "voltage", "input_delay.delay", 0.8, 1e-3, 50.0, ("draught",), 60.0)
-
-
-def _demo() -> Experiment:
-    with resources.as_file(resources.files("smajax") / "data" / "demo" / "complete") as folder:
-        return load_experiment(folder / "experiment.toml", CATALOGUE)
-
-
-def _early(volts: jax.Array) -> jax.Array:
-    """Written down 0.6 s before it acted."""
-    return jnp.concatenate([volts[6:], jnp.full(6, volts[-1])])
 
 
 def _twice_wrong(
@@ -73,9 +60,9 @@ def _twice_wrong(
 @pytest.mark.parametrize(
     ("second", "coefficient", "value", "truth"),
     [
-        (_early, "input_delay.delay", 0.6, {}),
+        (early, "input_delay.delay", 0.6, {}),
         pytest.param(lambda volts: volts / 1.08, "input_level.gain", 0.08, {}, marks=pytest.mark.slow),
-        (_early, "input_delay.delay", 0.6, {"latent_heat.enthalpy": 1.2e4}),
+        (early, "input_delay.delay", 0.6, {"latent_heat.enthalpy": 1.2e4}),
     ],
     ids=["recorded early", "noted too low", "recorded early beside a latent heat"],
 )
@@ -142,7 +129,7 @@ def _loop_with_a_trial(
 
     `ended`: whether the record was asked for when the first search had come to its end; `again`: whether the next search finds it too, and not on trial.
     """
-    experiment = _demo()
+    experiment = demo()
     tried = dataclasses.replace(FOUND, on_trial=True)
     said: list[object] = []
     asked: list[tuple[int, bool]] = []
