@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from importlib import import_module
 
 import jax
 import jax.numpy as jnp
@@ -34,7 +33,6 @@ from tests.helpers.hot_weight import DT, SAMPLES, UNKNOWNS, hot_weight
 from tests.helpers.made_findings import made_findings
 from tests.helpers.wrong_records import FOUND, demo, early
 
-loop = import_module("smajax.attribution.close_loop")
 NAMES = ("first", "second", "third", "fourth")
 
 
