@@ -224,6 +224,7 @@ class Rejected:
     effects: tuple[str, ...]
     rmse_without: float
     rmse_with: float
+    may_be_chance: bool = False  # the difference; by more than `held_out_worse`, of a model that leaves more than noise
 
 
 @dataclass(frozen=True)

@@ -64,7 +64,8 @@ def validated(
         for one in (compared, whole)
     )
     setting.set_aside(final, HeldOutWorse(without_them, with_them), gone)
-    return left, compared, Rejected(gone, without_them, with_them)
+    beyond_chance = "worse" in (_beside(whole, compared, setting), _beside(whole, whole, setting, "before"))
+    return left, compared, Rejected(gone, without_them, with_them, may_be_chance=not beyond_chance)
 
 
 def _with_one_fewer(  # what `validated` has at hand

@@ -29,7 +29,8 @@ def what_is_searched(one: FoundRecordErrors | NotConfirmed) -> str:
     """Why the search begins again: with a record corrected, or with those that were corrected on trial as they were logged."""
     if isinstance(one, NotConfirmed):
         names = and_listed([f"the {wrong.channel} of {wrong.run}" for wrong in one.errors])
-        return f"no model that leaves little more than noise needs {names} corrected; it is taken as it was logged"
+        logged = "it is taken as it was logged" if len(one.errors) == 1 else "they are taken as they were logged"
+        return f"no model that leaves little more than noise needs {names} corrected; {logged}"
     wrong = and_listed([what_was_wrong(error) for error in one.errors])
     again = f"{wrong}; the search begins again with {'that run' if len(one.errors) == 1 else 'these runs'} corrected"
     return f"{again}, on trial: more than noise is left" if one.errors[0].on_trial else again

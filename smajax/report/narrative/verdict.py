@@ -254,9 +254,14 @@ def _rejected(findings: Findings, rejected: Rejected) -> str:
     """Of one search."""
     named = and_listed([effect.title for effect in findings.effects if effect.name in rejected.effects])
     without, with_it = (error_text(findings, one) for one in (rejected.rmse_without, rejected.rmse_with))
+    chance = (
+        " How far these two differ may be chance, but more than noise is left of the fit runs as well."
+        if rejected.may_be_chance
+        else ""
+    )
     text = (
         f"{named} would lower the error on the fit runs, but not on the runs that were held out ({without} without, "
-        f"{with_it} with): it is not confirmed, and not named."
+        f"{with_it} with): it is not confirmed, and not named.{chance}"
     )
     return text[0].upper() + text[1:]
 
