@@ -17,8 +17,10 @@ LEFT = np.random.default_rng(1).normal(size=400)
 OWN = {letters: np.random.default_rng(ord(letters[-1])).normal(size=400) for letters in ("a", "b", "ab")}
 
 
-def _models(monkeypatch: pytest.MonkeyPatch, errors: dict[str, float], explained: bool = True) -> tuple[list[str], Any]:
-    """Stand-ins of models whose held-out residual has these root mean squares, by their effects; what was rejected."""
+def _models(
+    monkeypatch: pytest.MonkeyPatch, errors: dict[str, float], explained: bool = True, chance: bool = False
+) -> tuple[list[str], Any]:
+    """Stand-ins of models whose held-out residual has these root mean squares, by their effects; what was rejected, as what `may_be_chance`."""
 
     def residual(effects: str) -> np.ndarray:
         size = errors[effects]
@@ -58,6 +60,7 @@ def _models(monkeypatch: pytest.MonkeyPatch, errors: dict[str, float], explained
     setting: Any = SimpleNamespace(config=AttributionConfig(), set_aside=lambda model, reason, gone: noted.extend(gone))
     left, _, rejected = validated(None, setting, search, model(""), model("ab"))  # type: ignore[arg-type]
     assert noted == list(rejected.effects if rejected is not None else ())
+    assert rejected is None or rejected.may_be_chance == chance
     return noted, left
 
 
@@ -85,6 +88,6 @@ def test_what_explains_neither_the_fit_runs_nor_predicts_others_is_rejected(
 ) -> None:
     """Where chance may make the difference, an error of 1.3 times the base model's is enough, unless the fit runs are explained."""
     monkeypatch.setattr(held_out, "runs_compared", lambda *_: "alike")
-    found, left = _models(monkeypatch, {"": 1.0, "a": 1.2, "ab": 1.5, "b": 1.1}, explained)
+    found, left = _models(monkeypatch, {"": 1.0, "a": 1.2, "ab": 1.5, "b": 1.1}, explained, chance=True)
     assert found == rejected
     assert left.effects == tuple(name for name in "ab" if name not in rejected)
