@@ -6,6 +6,7 @@ left out by one Gauss-Newton step.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -28,6 +29,7 @@ class Left(NamedTuple):
     before: np.ndarray  # by the model fitted to all
     after: np.ndarray  # and to the others
     noise: float
+    of_all: float = math.inf  # what is left of all runs by the model fitted to all
 
     @property
     def stands_out(self) -> bool:
@@ -35,7 +37,9 @@ class Left(NamedTuple):
         if len(self.groups) < 2:
             return False
         little = self.after < np.maximum(LITTLE * self.before, NEAR_NOISE * self.noise)
-        return bool(little.any() or self.after[0] < BESIDE_OTHERS * self.after[1])
+        # What values of presets take away, with or without any run, says nothing of that run.
+        kept = self.after < BESIDE_OTHERS * self.before
+        return bool((little & kept).any() or self.after[0] < BESIDE_OTHERS * self.after[1])
 
 
 def left_without(setting: Search, model: Model | FittedModel, program: Sequence[str] | None = None) -> tuple[Left, ...]:
@@ -47,8 +51,9 @@ def left_without(setting: Search, model: Model | FittedModel, program: Sequence[
     program = model.effects if program is None else program
     here = fitted_model(joint, model.effects, model.values, program)
     noise, most = float(setting.problem.noise_sigma), 2 if setting.problem.batch.runs >= LEAST_RUNS_OF_TWO else 1
-    found = []
-    for groups, before, after in left_of_the_others(joint, here, max(noise, here.rms), program, most):
+    of_all, found = left_of_the_others(joint, here, max(noise, here.rms), program, most)
+    in_order = []
+    for groups, before, after in found:
         order = np.argsort(after, kind="stable")
-        found.append(Left(tuple(groups[k] for k in order), before[order], after[order], noise))
-    return tuple(found)
+        in_order.append(Left(tuple(groups[k] for k in order), before[order], after[order], noise, of_all))
+    return tuple(in_order)

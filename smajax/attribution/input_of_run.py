@@ -13,6 +13,7 @@ likelier than none by more than twenty to one, and the effects found beside it w
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -44,6 +45,8 @@ FAR_LESS = 4.0  # times that what the present model leaves before a search has e
 ON_TRIAL = (
     4.0  # times less than the base model that values of one run, or of two, leave of all runs, to be corrected on trial
 )
+SHARE_LEFT = 0.5  # of the squares beyond noise that the model found leaves: with an error of a record that much may be left when a search has ended
+AT_NOISE = 1.1  # noises: what leaves no more leaves noise
 LEAST_RUNS = 3  # of two runs that disagree either may be the wrong one
 
 
@@ -115,6 +118,10 @@ class _Compared:
         most = MOST_LEFT * self.noise
         if self.times_less is not None:
             most = min(most, self.present.rms / self.times_less)
+        else:
+            # Of what the present model leaves beyond noise most: a small error of any record takes a little of what all else is missing.
+            beyond = max(self.present.rms**2 - self.noise**2, 0.0)
+            most = min(most, max(AT_NOISE * self.noise, math.sqrt(self.noise**2 + SHARE_LEFT * beyond)))
         return [fit for fit in fits if fit.model.rms <= most and self.ahead(fit) >= LEAST_ODDS]
 
     def on_trial(self, fits: Sequence[Fit]) -> list[Fit]:

@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from smajax.attribution.doubtful_runs import left_without
+from smajax.attribution.doubtful_runs import Left, left_without
 from smajax.attribution.exclusive_effects import replaceable
 from smajax.attribution.findings import LikelierModel, NoLikelierModel, Reason, Round, StepDependent
 from smajax.attribution.fitted_sets import JointRound, JointSearch
@@ -37,6 +37,8 @@ from smajax.model.effects.prior_width import CoefficientPrior
 
 LIKELIEST = 4  # sets of effects from which the search goes on with the values of presets free
 FREED_SHARE = 2.0 / 3.0  # of the base error, to which free values of presets lower it where the search begins so
+FREED_BY_A_STEP = 0.5  # of what many effects leave, to which values of presets lower it by one Gauss-Newton step where the search with these held ends
+AS_LITTLE = 1.5  # times as much: such a step does not tell models apart
 
 
 @dataclass
@@ -132,10 +134,10 @@ class _Stage:
         return self._one_effect(search, found, [named]) or found
 
     def has_wrong_record(self, search: JointSearch, found: FittedModel) -> bool:
-        """Whether the search ends because inputs of runs were recorded wrongly, or values of presets are all that was missing; asked once a search, where `found` has many effects and leaves many noises.
+        """Whether the search ends because inputs of runs were recorded wrongly, or values of presets are what was missing; where `found` has many effects and leaves many noises.
 
-        They may stand in for it, and each round about them costs more than to ask. It is sought beside those of the base model and `found` that leave much less of the other runs when one or two runs are left out, and the likeliest model
-        of few effects; as long as none does, it is not asked.
+        They may stand in for it, and each round about them costs more than to ask. A wrong record is sought beside those of the base model and `found` that leave much less of the other runs when one or two runs are left out, and the likeliest model
+        of few effects; once a search, and as long as none does, it is not asked.
         """
         ask = self.setting.wrong_record
         if ask is None or search.thorough in self.asked_for_records or found.rms < FAR_LESS * search.noise:
@@ -144,9 +146,11 @@ class _Stage:
         variance = min(map(search.error, few), default=1.0) ** 2
         likeliest = sorted(few, key=lambda one: -one.log_evidence(variance))[:1]
         models = [search.fitted[()], *likeliest, found]
-        better = [self._better_without_runs(search, one) for one in models]
+        left = [self._without_runs(search, one) for one in models]
+        better = [any(one.stands_out for one in its_left) for its_left in left]
         if not any(better):
-            return False
+            search.free_beside = None if search.thorough else _freed_by_a_step(models, left, found)
+            return search.free_beside is not None
         # What many effects stand in for may be one of the few beside the record.
         hosts = [one for one, much in zip(models, better, strict=True) if much or one in likeliest]
         self.asked_for_records.add(search.thorough)
@@ -157,13 +161,12 @@ class _Stage:
         search.wrong_record = wrong
         return wrong is not None
 
-    def _better_without_runs(self, search: JointSearch, model: FittedModel) -> bool:
-        """Whether next to noise is left of the others without one run, or little of what is, or half of what is left without any other run; or so without two."""
+    def _without_runs(self, search: JointSearch, model: FittedModel) -> tuple[Left, ...]:
+        """What is left of the others without one run, and without two."""
         # Of the programs that are compiled the smallest; what an earlier search carried may be in the base model since.
         programs = [search.joint.ordered(one) for one in search.programs]
         fitting = [one for one in programs if set(model.effects) <= set(one)]
-        program = min(fitting, key=len, default=model.effects)
-        return any(left.stands_out for left in left_without(self.setting, model, program))
+        return left_without(self.setting, model, min(fitting, key=len, default=model.effects))
 
     def before_the_end(self, search: JointSearch, found: FittedModel) -> FittedModel | None:
         """One effect that is likelier than those of `found`, in an equation where an unknown function is likelier than these too."""
@@ -273,6 +276,17 @@ class _Stage:
 
     def _note(self, chosen: str, reason: Reason) -> None:
         self.setting.note(Round(len(self.setting.rounds) + 1, (), chosen, reason))
+
+
+def _freed_by_a_step(
+    models: Sequence[FittedModel], left: Sequence[Sequence[Left]], found: FittedModel
+) -> tuple[str, ...] | None:
+    """Effects of the smallest of `models` of which values of presets take as much as of any, where that is most of what `found` leaves; None elsewhere."""
+    of_all = [its_left[0].of_all for its_left in left]
+    if min(of_all) > FREED_BY_A_STEP * found.rms:
+        return None
+    alike = [model for model, rms in zip(models, of_all, strict=True) if rms <= AS_LITTLE * min(of_all)]
+    return min(alike, key=lambda one: len(one.effects)).effects
 
 
 def likeliest_so_far(search: JointSearch, best: FittedModel) -> tuple[JointSearch, Model, Model]:

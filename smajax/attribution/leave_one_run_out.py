@@ -69,31 +69,47 @@ def left_out(joint: JointParameters, model: FittedModel, error: float, program: 
     return LeftOut(np.stack([found[part, series] for series, part in enumerate(owner)]), every)
 
 
+class LeftOfOthers(NamedTuple):
+    """What a model leaves of the other runs without each of `groups`, root mean squares, SI, each by one Gauss-Newton step."""
+
+    groups: list[tuple[int, ...]]  # runs that are left out
+    before: np.ndarray  # fitted to all runs
+    after: np.ndarray  # fitted to the others alone
+
+
 def left_of_the_others(
     joint: JointParameters, model: FittedModel, error: float, program: Sequence[str], most: int = 1
-) -> list[tuple[list[tuple[int, ...]], np.ndarray, np.ndarray]]:
-    """(runs that are left out, root mean squares of what `model` leaves of the others, and of what it would leave fitted to them alone, by one Gauss-Newton step).
+) -> tuple[float, list[LeftOfOthers]]:
+    """(root mean square that `model` would leave of all runs, fitted to all; what without each run in turn, without each two, and so on up to `most` at once).
 
-    Each run in turn, each two, and so on up to `most` at once. `error` and `program` as of `left_out`; SI.
+    Both by one Gauss-Newton step of what `joint` has free, which may be more than the model was fitted with. `error` and `program` as of `left_out`; SI.
     """
     problem, index = joint.restricted(program)
     problem = problem.with_noise(error)
     gram, gradient, misfit = _normal_equations(problem, model, model.values[index])
     squares, samples = problem.by_run(misfit**2).sum(axis=1), problem.by_run(np.asarray(problem.batch.mask)).sum(axis=1)
+    prior = np.diag(model.precision)
+
+    def step_to(series: np.ndarray) -> np.ndarray:
+        return np.asarray(np.linalg.solve(gram[series].sum(axis=0) + prior, gradient[series].sum(axis=0)))
+
+    def mean_square(step: np.ndarray, runs: Sequence[int]) -> float:
+        series = np.isin(problem.owner, runs)
+        lower = 2.0 * float(step @ gradient[series].sum(axis=0)) - float(step @ gram[series].sum(axis=0) @ step)
+        return max(squares[runs].sum() - lower, 0.0) / float(samples[runs].sum())
+
+    every = list(range(problem.batch.runs))
+    to_all = step_to(np.ones(len(problem.owner), bool))
     found = []
     for together in range(1, most + 1):
-        groups = list(itertools.combinations(range(problem.batch.runs), together))
+        groups = list(itertools.combinations(every, together))
         before, after = [], []
         for gone in groups:
-            other = ~np.isin(problem.owner, gone)
-            stay = [run for run in range(problem.batch.runs) if run not in gone]
-            count, left = samples[stay].sum(), squares[stay].sum()
-            others, slope = gram[other].sum(axis=0), gradient[other].sum(axis=0)
-            step = np.linalg.solve(others + np.diag(model.precision), slope)
-            before.append(left / count)
-            after.append(max(left - 2.0 * float(step @ slope) + float(step @ others @ step), 0.0) / count)
-        found.append((groups, error * np.sqrt(before), error * np.sqrt(after)))
-    return found
+            stay = [run for run in every if run not in gone]
+            before.append(mean_square(to_all, stay))
+            after.append(mean_square(step_to(~np.isin(problem.owner, gone)), stay))
+        found.append(LeftOfOthers(groups, error * np.sqrt(before), error * np.sqrt(after)))
+    return error * float(np.sqrt(mean_square(to_all, every))), found
 
 
 def predicting(

@@ -65,7 +65,7 @@ def _determined(checks: Checks) -> Iterator[str]:
         )
     for name in checks.said_by_parameters:
         effect = LIBRARY[name].candidate
-        yield f"{effect.title[0].upper()}{effect.title[1:]}: not looked for, because the search fits {and_listed(effect.same_as)}, which say the same."
+        yield f"{effect.title[0].upper()}{effect.title[1:]}: not named in the end, because the search fits {and_listed(effect.same_as)}, which say the same."
 
 
 def identifiability_sentences(found: Identifiability) -> list[str]:

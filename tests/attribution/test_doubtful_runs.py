@@ -28,6 +28,12 @@ def test_a_run_stands_out_where_little_is_left_without_it(after: list[float], st
     assert Left(groups, np.ones(len(after)), np.asarray(after), 0.1).stands_out is stands_out
 
 
+def test_what_is_gone_with_or_without_a_run_says_nothing_of_it() -> None:
+    """As where values of presets, which are free without a run, were what was missing."""
+    alike = np.asarray([0.1, 0.12, 0.13])
+    assert not Left(((0,), (1,), (2,)), 1.5 * alike, alike, 0.1).stands_out
+
+
 def test_two_runs_whose_levels_are_wrong_stand_out_together_and_neither_alone() -> None:
     joint = hot_weight({}, ("latent_heat",), steps=(*VOLTS, (7.5, 3.0), (8.5, 2.0))).joint
     batch = joint.problem.batch

@@ -152,12 +152,43 @@ THREE = ("latent_heat", "creep", "radiation")
 FOUND = FoundRecordErrors((RecordError("steps", "voltage", "input_delay.delay", 0.8, 1e-3, 50.0, (), 60.0),), ())
 
 
+def _left(stands_out: bool, of_all: float = 5.0) -> tuple[Any, ...]:
+    return (SimpleNamespace(stands_out=stands_out, of_all=of_all),)
+
+
+@pytest.mark.parametrize(
+    ("of_all", "beside"),
+    [
+        ((2.0, 1.4, 1.0), THREE[:1]),  # the fewest effects of which values of presets take as much as of any
+        ((1.2, 1.4, 1.0), ()),
+        ((4.0, 3.0, 2.6), None),  # of 5.0, half and more
+    ],
+)
+def test_a_search_with_values_of_presets_held_ends_where_a_step_of_these_takes_most(
+    monkeypatch: pytest.MonkeyPatch, of_all: tuple[float, ...], beside: tuple[str, ...] | None
+) -> None:
+    """Without any run as well as with all of them: so no record is looked for."""
+    stage, search, _ = _stage_and_search(monkeypatch, [], [])
+    stage.setting.wrong_record = lambda *_: pytest.fail("a record was asked for")
+    left = [*of_all, *of_all]
+    monkeypatch.setattr(joint_stage._Stage, "_without_runs", lambda *_: _left(False, left.pop(0)))
+    search.free_beside, search.thorough = None, False
+    search.fitted |= {(): _model((), 9.0, 0.0), THREE[:1]: _model(THREE[:1], 5.0, 3.0)}
+    many = cast(Any, _model(THREE, 5.0, 9.0))
+    many.rms = 5.0
+    assert stage.has_wrong_record(search, many) is (beside is not None)
+    assert search.free_beside == beside
+    search.thorough, search.free_beside = True, None  # they are free already
+    assert not stage.has_wrong_record(search, many)
+    assert search.free_beside is None
+
+
 def test_a_search_with_values_of_presets_held_ends_where_these_alone_were_missing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     stage, search, _ = _stage_and_search(monkeypatch, [], [])
     stage.setting.wrong_record = lambda *_: FoundRecordErrors((), THREE[:1])
-    monkeypatch.setattr(joint_stage._Stage, "_better_without_runs", lambda *_: True)
+    monkeypatch.setattr(joint_stage._Stage, "_without_runs", lambda *_: _left(True))
     search.joint.ordered, search.free_beside = tuple, None
     search.fitted |= {THREE[:1]: _model(THREE[:1], 5.0, 3.0)}
     many = cast(Any, _model(THREE, 5.0, 9.0))
@@ -266,7 +297,7 @@ def test_a_wrong_record_is_asked_for_once_where_many_effects_leave_many_noises(
         return FOUND
 
     better = [False, False, False, True, False, False, True, True, True]
-    monkeypatch.setattr(joint_stage._Stage, "_better_without_runs", lambda *_: better.pop(0))
+    monkeypatch.setattr(joint_stage._Stage, "_without_runs", lambda *_: _left(better.pop(0)))
 
     stage.setting.wrong_record = wrong_record
     search.fitted |= {effects: _model(effects, 5.0, odds) for effects, odds in ((THREE[:1], 3.0), (THREE[1:], 1.0))}

@@ -65,5 +65,5 @@ def test_what_says_the_same_names_parameters_of_a_wire() -> None:
 def test_the_check_says_what_is_not_looked_for_and_why() -> None:
     (*_, said) = check_sentences((), Checks(Identifiability((), 0, 0), said_by_parameters=("unequal_stress_slopes",)))
     assert said == (
-        "Unequal stress slopes: not looked for, because the search fits stress_slope_austenite and stress_slope_martensite, which say the same."
+        "Unequal stress slopes: not named in the end, because the search fits stress_slope_austenite and stress_slope_martensite, which say the same."
     )

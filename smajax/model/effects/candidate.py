@@ -28,6 +28,7 @@ PRIOR_ODDS: Mapping[PriorClass, float] = MappingProxyType({"material": 0.1, "ben
 # `Candidate.exclusive_group` of the effects that change how the transformation runs through its range.
 TRANSFORMATION_SHAPE = "shape of the transformation"
 DELAY = "delay"
+CONVECTION_OF_TEMPERATURE = "convection that depends on the temperature"
 LOST_MOTION = "lost motion where it turns"
 
 Scale = Literal["", "stroke", "increment", "run", "load", "1/run", "stroke/run"]

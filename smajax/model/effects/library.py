@@ -22,6 +22,7 @@ _NAMES = (
     "input_clock",
     "latent_heat",
     "rising_convection",
+    "free_convection",
     "radiation",
     "ambient_drift",
     "draught",

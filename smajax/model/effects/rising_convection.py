@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate, Width
+from smajax.model.effects.candidate import CONVECTION_OF_TEMPERATURE, Candidate, Width
 from smajax.model.types import Scalar
 from smajax.model.wire.heat import HeatState, HeatTerm, convection
 from smajax.model.wire.wire import Wire
@@ -30,6 +30,7 @@ class RisingConvection(AbstractEffect, HeatTerm):
         switches=("slope",),
         initial_guess={"slope": 2e-3},
         prior_class="material",
+        similar_group=CONVECTION_OF_TEMPERATURE,
         widths={
             "slope": Width(
                 4e-3,
