@@ -60,8 +60,8 @@ def controller_source(
             f"the period is {used.period:g} s and the delay {used.delay} periods; expected more than 0 s, and 0 periods or more."
         )
     assumed = with_limit(system, used.command_limit)
-    between = {"estimator": used.estimator or None, "noise": found.loop.noise or 0.0, "delay": used.delay}
-    loop = loop_around(assumed, found.controller, found, **between)
+    filtered, noise = used.estimator or None, found.loop.noise or 0.0
+    loop = loop_around(assumed, found.controller, found, estimator=filtered, noise=noise, delay=used.delay)
     known = CONTROLLERS[found.controller].known
     source = c_source(
         lambda: controller_block(loop.system, loop.controller, loop.estimator, used.period, used.delay, name, known),
