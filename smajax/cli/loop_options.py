@@ -20,7 +20,7 @@ OF_FILE = "default that of the gains file, else"
 Estimator = Annotated[
     str | None,
     typer.Option(
-        help=f"`printed` or `model` filter, '' for the true state; {OF_FILE} the true state",
+        help=f"extended Kalman filter `model`, `adaptive` (parameters too) or `printed` (of the source's arm), '' for the true state; {OF_FILE} the true state",
         autocompletion=completion.estimators,
     ),
 ]
@@ -34,7 +34,8 @@ Delay = Annotated[
 Noise = Annotated[
     str,
     typer.Option(
-        help="noise of the readings (1 sigma), 0.1deg or 20um, without a unit in deg, or in mm of a length; default that of the model file, else none"
+        help="noise of the readings (1 sigma), 0.1deg or 20um, without a unit in deg, or in mm of a length, also what the filters `model` and `adaptive` take for it; "
+        "default that of the model file, else none"
     ),
 ]
 

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import overload
 
 from smajax.control.controllers.base import AbstractController
 from smajax.control.loop_around import loop_around
 from smajax.control.loop_dataset import Loop
 from smajax.control.mismatch import MISMATCHES, mismatches_of, ratio_of
+from smajax.control.presets import FILTERS
 from smajax.core.names import of_many
 from smajax.core.parameters import check_bounds, parameter_values, parameters, set_parameters
 from smajax.core.units import UnitError, parse_quantity
+from smajax.core.wording import and_listed
 from smajax.data.model_catalogue import check_together
 from smajax.model.effects.library import LIBRARY
 from smajax.model.extended import extended, with_effects
@@ -22,6 +25,13 @@ from smajax.model.wire.laws import under_law
 from smajax.model.wire.order import check_order
 
 PARAMETERS = "`smajax presets WIRE LOAD DRIVE` lists those of a model, `smajax effects` those of effects"
+
+OF_FILTER = {
+    "reading_noise": "A filter takes the noise of the loop's readings for it: --noise of a command, `noise` of `loop_around`."
+}
+IN_PYTHON = (
+    "It is set in Python: `loop_around(..., estimator=set_parameters(FILTERS[NAME](system), {PARAMETER: VALUE}))`."
+)
 
 
 def parameter_name(system: System, name: str) -> str:
@@ -36,7 +46,18 @@ def parameter_name(system: System, name: str) -> str:
     if name in meant:
         return meant[name]
     which = f"{name!r} ({MISMATCHES[name]})" if name in MISMATCHES else f"{name!r}"
+    if filters := _filters_with(system, name):
+        raise ValueError(f"no parameter {which} of the model: it is one of {filters}. {OF_FILTER.get(name, IN_PYTHON)}")
     raise ValueError(f"no parameter {which}{of_many(name, [*table, *short], PARAMETERS)}")
+
+
+def _filters_with(system: System, name: str) -> str:
+    """The filters that have a parameter of this name; "" of none, and of a load that no filter goes with."""
+    found = []
+    for own, make in FILTERS.items():
+        with suppress(ValueError):
+            found += [f"`{own}`"] if name in parameters(make(system)) else []
+    return f"the filter{'s' * (len(found) > 1)} {and_listed(found)}" if found else ""
 
 
 def _value(before: System, system: System, name: str, own: str, value: str | float) -> float:

@@ -11,7 +11,7 @@ from smajax.control.gains_file import Gains, read_gains
 from smajax.control.load_equation import moving_load
 from smajax.control.loop_dataset import Loop
 from smajax.control.measured_state import Sensor
-from smajax.control.presets import CONTROLLERS, FILTERS, check_controller
+from smajax.control.presets import CONTROLLERS, check_controller, filter_of
 from smajax.core.names import close_matches
 from smajax.core.units import parse_quantity
 from smajax.model.system import System
@@ -33,7 +33,8 @@ def loop_around(
     controller: the name of one in `CONTROLLERS`, or one of one's own. gains: by name, SI or text with a unit (`"900 V/m"`), a
     file of `smajax tune`, or none: those of the arm, scaled to this plant (`control.scales`); gains that are not named keep
     that value. estimator: the name of a filter, or one of one's own; none: the true state. noise: standard deviation of the
-    reading, rad or m, or text (`"20 um"`). quantum: step between two readings, likewise; 0: none. delay: control periods until a command arrives. assumed: the plant that
+    reading, rad or m, or text (`"20 um"`). A filter by name (`model`, `adaptive`) has the same noise for the standard deviation of a reading
+    (`reading_noise`), 0 leaves it its preset's (`presets.filter_of`); one of one's own keeps what it has, and `printed` the R of its preset. quantum: step between two readings, likewise; 0: none. delay: control periods until a command arrives. assumed: the plant that
     controller and filter know; by default the system itself.
 
     Raises KeyError for a controller or filter there is not, GainsFileError for a file that cannot be used, UnitError for a
@@ -44,7 +45,7 @@ def loop_around(
     own = moving_load(system).reading[1]
     sigma, steps = (parse_quantity(one, own, bare=own) for one in (noise, quantum))
     sensor = Sensor(noise_sigma=sigma, quantum=steps) if sigma or steps else None
-    filtered = _filter(believed, estimator)
+    filtered = filter_of(estimator, believed, sigma) if isinstance(estimator, str) else estimator
     if isinstance(controller, AbstractController):
         if gains is not None:
             raise ValueError("gains go with the name of a controller: a controller of one's own has its gains already.")
@@ -55,14 +56,6 @@ def loop_around(
     preset = CONTROLLERS[controller]
     known = preset.plant(believed)
     return Loop(preset.plant(system), _gains(controller, gains, known).put(known), filtered, sensor, delay)
-
-
-def _filter(system: System, estimator: str | AbstractEstimator | None) -> AbstractEstimator | None:
-    if not isinstance(estimator, str):
-        return estimator
-    if estimator not in FILTERS:
-        raise KeyError(f"no filter {estimator!r}{close_matches(estimator, FILTERS, 'there are')}")
-    return FILTERS[estimator](system)
 
 
 def _gains(controller: str, gains: Mapping[str, float | str] | Gains | Path | None, system: System) -> Gains:

@@ -301,6 +301,12 @@ def _set_points(request: RunRequest, loop: LoopRequest, own: LoopInUse, every: i
     return _Wanted(clock, reference, levels.measured, length_of([levels], request.seconds))
 
 
+def _tracking_error(error: np.ndarray) -> dict[str, float]:
+    """Root mean square of `error`, (n,), as `RunResult.tracking_error`."""
+    parts = {"whole_run": error, "second_half": error[error.size // 2 :]}
+    return {name: float(np.sqrt(np.mean(part**2))) for name, part in parts.items()}
+
+
 COMPARED = ("temperature", "stress", "strain")  # beside the load's own reading
 MEASURED = "measured_"  # before the name of a sensor: the variable of its log
 
@@ -355,6 +361,7 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
         notes.append(str(error))
     figures = {name: float(value) for name, value in vars(merits).items()}
     by_set_point: tuple[SetPointMerit, ...] = ()
+    tracking_error: dict[str, float] = {}
     if np.ptp(position) > 0.0:
         figures = {}  # they are those of one set point from the start of the run
         count = len(set_point_spans(position))
@@ -364,12 +371,15 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
             by_set_point = merit_by_set_point(run, plant)
         else:
             notes.append(TooManySetPoints(count))
+        if not by_set_point:
+            tracking_error = _tracking_error(np.asarray(run.run.position) - position)
     notes += notes_of_set_points(assumed, position) or notes_of_reach(setup, position, figures, by_set_point)
     return RunResult(
         data=data,
         system=plant,
         merit=figures,
         notes=tuple(notes),
+        tracking_error=tracking_error,
         by_set_point=by_set_point,
         mismatches=mismatches(assumed, plant),
         settings=sources,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import xarray as xr
 
@@ -41,6 +41,8 @@ class RunResult:
     system: System
     merit: Mapping[str, float]
     notes: tuple[Note, ...]
+    # Root mean square, rad or m, over `whole_run` and `second_half`, which the way to the reference leaves out; of a reference without figures of merit.
+    tracking_error: Mapping[str, float] = field(default_factory=dict)
     by_set_point: tuple[SetPointMerit, ...] = ()  # figures of merit by set point, where there are several
     mismatches: tuple[Mismatch, ...] = ()
     settings: tuple[Source, ...] = ()  # what a closed loop takes from files of gains and of models

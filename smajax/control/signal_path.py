@@ -14,7 +14,7 @@ from smajax.control.estimators.base import AbstractEstimator
 from smajax.control.load_equation import moving_load
 from smajax.control.measured_state import Sensor
 from smajax.control.position_unit import DEGREES, PositionUnit, position_range, unit_of
-from smajax.control.presets import FILTERS, READING_STRAIN
+from smajax.control.presets import FILTERS, READING_STRAIN, filter_of
 from smajax.control.scales import is_arm
 from smajax.core.names import close_matches
 from smajax.core.units import UnitError, parse_quantity
@@ -97,11 +97,15 @@ def default_noise(system: System) -> float:
 def interface_of(
     system: System, filtered: str, noise: float, period: float, dt: float, delay: int, quantum: float = 0.0
 ) -> Interface:
-    """What lies between: the filter by name, noise and quantum in deg or mm, period in s, delay in periods."""
+    """What lies between: the filter by name, noise and quantum in deg or mm, period in s, delay in periods.
+
+    The filter has the sensor's noise for that of a reading (`presets.filter_of`).
+    """
     unit = unit_of(system)
-    sensor = Sensor(noise_sigma=float(unit.to_own(noise)), quantum=float(unit.to_own(quantum)))
+    sigma = float(unit.to_own(noise))
+    sensor = Sensor(noise_sigma=sigma, quantum=float(unit.to_own(quantum)))
     return Interface(
-        FILTERS[filtered](system) if filtered else None,
+        filter_of(filtered, system, sigma) if filtered else None,
         sensor if noise or quantum else None,
         round(period / dt),
         delay,

@@ -47,7 +47,7 @@ def controller_source(
     """The C of the controller in a file of gains on `system`, the plant that it assumes.
 
     estimator: the name of one, "" for the reading alone. period: s. delay: periods until a command arrives. What is None is what the gains
-    were tuned with, where their file says it. own_limit: the limit of the command is that of `system`, whatever the file says.
+    were tuned with, where their file says it; the estimator's noise of a reading is the one they were tuned with too. own_limit: the limit of the command is that of `system`, whatever the file says.
     arithmetic: of a build with single-precision inputs and outputs, "double" or "float"; None: "float" where that was measured to be enough.
     Raises GainsFileError as `read_gains`, ExportError for a controller that reads what nobody measures, KeyError for no estimator
     and ValueError as `loop_around`.
@@ -60,7 +60,8 @@ def controller_source(
             f"the period is {used.period:g} s and the delay {used.delay} periods; expected more than 0 s, and 0 periods or more."
         )
     assumed = with_limit(system, used.command_limit)
-    loop = loop_around(assumed, found.controller, found, estimator=used.estimator or None, delay=used.delay)
+    filtered, noise = used.estimator or None, found.loop.noise or 0.0
+    loop = loop_around(assumed, found.controller, found, estimator=filtered, noise=noise, delay=used.delay)
     known = CONTROLLERS[found.controller].known
     source = c_source(
         lambda: controller_block(loop.system, loop.controller, loop.estimator, used.period, used.delay, name, known),

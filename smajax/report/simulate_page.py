@@ -88,6 +88,7 @@ def record(result: RunResult, command: str, series: bool = True) -> dict[str, An
         "loop": None if result.loop is None else result.loop.record(),
         "merit_rule": merit_rule(result),
         "merit": _merit(result.merit, units),
+        "tracking_error": {part: {"value": value, "unit": own} for part, value in result.tracking_error.items()},
         "merit_by_set_point": [
             {
                 "begin_s": one.begin,
@@ -284,13 +285,14 @@ def _band(result: RunResult) -> float:
 def _merit_part(result: RunResult) -> list[str]:
     """The figures of merit of a closed loop."""
     rule = f"{html.escape(merit_rule(result))}</p>"
-    if result.merit:
-        return [table(["figure of merit", "value", "unit"], merit_rows(result), (1,)), f"<p class=quiet>{rule}"]
+    if rows := merit_rows(result):
+        said = [f"<p class=quiet>{rule}"] if result.merit else []
+        return [table(["figure of merit", "value", "unit"], rows, (1,)), *said]
     if not result.by_set_point:
         return []
-    head, rows = set_point_rows(result)
+    head, several = set_point_rows(result)
     note = f"<p class=quiet>Each from its start to the next one; times count from its start. {rule}"
-    return [table(head, rows, range(len(head))), note]
+    return [table(head, several, range(len(head))), note]
 
 
 def _settings_part(result: RunResult) -> list[str]:

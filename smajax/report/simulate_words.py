@@ -16,6 +16,7 @@ from smajax.control.run_notes import NotResolved
 from smajax.control.run_request import MEASURED
 from smajax.control.run_result import RunResult
 from smajax.core.display_units import axis_label, digits, display, label
+from smajax.core.wording import and_listed
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.report.measured_log import measured_of, measured_sentences
 
@@ -93,7 +94,12 @@ def summary_rows(data: xr.Dataset) -> list[list[str]]:
 
 
 def merit_rows(result: RunResult) -> list[list[str]]:
-    """A row a figure of merit; the steady ones with the time over which they are means, since a short run may still be moving."""
+    """A row a figure of merit; the steady ones with the time over which they are means, since a short run may still be moving.
+
+    Of a reference that has none of these the tracking error.
+    """
+    if result.tracking_error:
+        return [[f"tracking error (RMS, {part})", *cells] for part, cells in _tracking(result).items()]
     units = units_of(result)
     steady = f" (last {STEADY_SHARE:.0%} of the run)"
     return [
@@ -104,6 +110,12 @@ def merit_rows(result: RunResult) -> list[list[str]]:
         ]
         for name, value in result.merit.items()
     ]
+
+
+def _tracking(result: RunResult) -> dict[str, tuple[str, str]]:
+    """(the tracking error, its unit) as shown, over each part of the run in words."""
+    of = display(result.system.load.reading[1])
+    return {part.replace("_", " "): (digits(of.of(error), 3), of.unit) for part, error in result.tracking_error.items()}
 
 
 def _cell(name: str, value: float, units: Mapping[str, str], seconds: float) -> str:
@@ -246,7 +258,7 @@ def answer(result: RunResult) -> str:
 
 
 def _answer(result: RunResult) -> str:
-    """Settling time, overshoot and steady error of a closed loop, the way and the temperature of an open run."""
+    """Settling time, overshoot and steady error of a closed loop or its tracking error, the way and the temperature of an open run."""
     data = result.data
     if not np.isfinite(data["temperature"]).all():
         return "The run has values that are not finite."
@@ -265,6 +277,9 @@ def _answer(result: RunResult) -> str:
         where = f": {', '.join(each)}" if len(each) <= SEVERAL and count else ""
         errors = _errors(result, [figures_of(one) for one in result.by_set_point])
         return f"{name} settles at {count or 'none'} of {len(each)} set points{where}; {errors}."
+    if result.tracking_error:
+        parts = [f"{' '.join(cells)} over the {part}" for part, cells in _tracking(result).items()]
+        return f"{name} follows the reference with an RMS tracking error of {and_listed(parts)}."
     log = measured_sentences(result)
     return log[0] if log else run_sentences(result)[2] if not name else f"{name}: {run_sentences(result)[2]}"
 

@@ -19,7 +19,7 @@ from smajax.data.text_input import given
 from smajax.model.presets import build
 from smajax.report.note_words import note_sentences
 from smajax.report.simulate_page import write_run
-from smajax.report.simulate_words import merit_rule, set_point_rows
+from smajax.report.simulate_words import answer, merit_rows, merit_rule, set_point_rows
 
 pytestmark = pytest.mark.usefixtures("blank_pictures")
 
@@ -46,6 +46,14 @@ def test_a_reference_from_a_file_is_the_same_on_a_terminal_and_in_python(tmp_pat
     lines, stairs = (followed(f"{path}:angle_deg:deg{how}", bool(how)) for how in ("", ":held"))
     off = [float(np.sqrt(np.mean((one.data["position"] - one.data["wanted"])[1000:] ** 2))) for one in (lines, stairs)]
     assert off[0] < off[1], "the derivatives of the reference are lost"
+    error = np.degrees(lines.data["position"] - lines.data["wanted"])
+    for part, over in (("whole_run", slice(None)), ("second_half", slice(1000, None))):
+        assert np.degrees(lines.tracking_error[part]) == pytest.approx(
+            float(np.sqrt(np.mean(error[over] ** 2))), rel=1e-9
+        )
+    said = [["tracking error (RMS, whole run)", "deg"], ["tracking error (RMS, second half)", "deg"]]
+    assert [[row[0], row[2]] for row in merit_rows(lines)] == said
+    assert "follows the reference with an RMS tracking error of" in answer(lines)
     (note,) = note_sentences(lines.notes)
     assert f"{path}:angle_deg:deg:held" in note
     assert not any(isinstance(one, StraightLines) for one in stairs.notes)
@@ -58,6 +66,7 @@ def test_rows_of_a_file_that_are_held_have_figures_of_merit(tmp_path: Path) -> N
         for text in (f"{tmp_path / 'points.csv'}:angle_deg:held", "40deg:3s,10deg:2s")
     )
     assert [one.begin for one in found.by_set_point] == [0.0, 3.0]
+    assert not found.tracking_error
     np.testing.assert_array_equal(found.data["position"], asked.data["position"])
 
 

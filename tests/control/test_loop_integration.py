@@ -56,7 +56,7 @@ def test_a_sweep_says_what_its_integration_leaves(tmp_path: Path) -> None:
     assert again.integration_error == error
 
 
-SWITCHING = LoopRequest("sld", "40deg:5s,10deg:5s", noise=0.1, delay=2, estimator="model")
+SWITCHING = LoopRequest("sld", "40deg:5s,10deg:5s", noise=0.03, delay=2, estimator="model")
 
 
 def test_a_run_that_no_integration_settles_says_so_and_has_one_error_however_it_was_asked_for() -> None:

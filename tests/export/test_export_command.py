@@ -147,6 +147,16 @@ def test_period_delay_and_filter_are_those_that_the_gains_were_tuned_with(tmp_pa
         controller_source(arm(), file, period=0.0)
 
 
+def test_the_filter_expects_the_noise_that_the_gains_were_tuned_with(tmp_path):
+    def of_noise(noise):
+        tuned = Gains("pid", {}, loop=LoopSettings(estimator="model", noise=noise, position_unit="rad"))
+        file = write_gains(tmp_path / "tuned.json", tuned, tuned.units(arm()), {})
+        return controller_source(arm(), file).source
+
+    assert of_noise(None) == of_noise(0.0)
+    assert of_noise(0.01) != of_noise(0.0)
+
+
 def test_the_loop_is_the_one_that_other_commands_run(tmp_path):
     source = controller_source(arm(), gains_file(tmp_path, proportional_gain=7.5))
     loop = loop_around(arm(), "pid", {"proportional_gain": 7.5})

@@ -13,6 +13,8 @@ parameter of the believed system, by name.
 
 from __future__ import annotations
 
+import dataclasses
+
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
@@ -50,6 +52,9 @@ class AdaptiveFilter(AbstractEstimator):
     )
     ratio_time: Scalar = parameter("s", 1e-3, 1e9, "tau: time after which an estimated parameter may be another")
     estimated: tuple[str, ...] = eqx.field(static=True, default=("convection_coefficient",))
+
+    def with_reading_noise(self, noise: float) -> AdaptiveFilter:
+        return dataclasses.replace(self, filter=self.filter.with_reading_noise(noise))
 
     def start(self, reading: Scalar) -> tuple[AdaptiveFilterMemory, MeasuredState]:
         rest, belief = self.filter.belief_at_rest(reading)

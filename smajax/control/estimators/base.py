@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import abc
-from typing import Any
+from typing import Any, Self
 
 import equinox as eqx
 
@@ -21,3 +21,10 @@ class AbstractEstimator(eqx.Module):
     @abc.abstractmethod
     def step(self, memory: Any, reading: Scalar, voltage: Scalar, period: Scalar) -> tuple[Any, MeasuredState]:
         """(memory, estimate) at `reading`, after `voltage` was held for `period` seconds."""
+
+    def with_reading_noise(self, noise: float) -> Self:
+        """The same for readings with this standard deviation, in their own unit (rad or m), more than 0.
+
+        A noise that differs by a thousandth at most from the one that it has may leave that. By default itself: an estimator without a variance of the reading, or whose variance is none of the sensor's.
+        """
+        return self

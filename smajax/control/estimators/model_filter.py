@@ -29,7 +29,7 @@ from smajax.control.estimators.kalman import (
     corrected,
 )
 from smajax.control.measured_state import MeasuredState, truth
-from smajax.core.parameters import parameter
+from smajax.core.parameters import parameter, set_parameters
 from smajax.model.system import System, initial_state
 from smajax.model.types import Scalar, State
 from smajax.model.wire.branch_amplitude import beyond
@@ -43,6 +43,10 @@ UNEXPLAINED = 5.0
 # sure of its fraction to follow the readings, and the curves go through the wrong state. Not where it believes that the wire transforms: there the
 # curves go with every correction, and are no less certain for it.
 OFF_BRANCH = (1.0, 3e-3)
+
+# Share by which a noise may differ from the one that a filter has and still be that one: the preset of `adaptive` is 3.2e-5 of the wire's length, which on the
+# arm is 0.10001 deg, and loops with 0.1 deg are to go on as they went.
+SAME_NOISE = 1e-3
 
 
 def none_yet(reading: Scalar) -> Innovation:
@@ -88,6 +92,10 @@ class ModelFilter(AbstractEstimator):
     # curves through the corrected state, whose temperature and fraction are then less certain (`unexplained`). Not where xi_M has to stand for
     # a temperature that is degrees off, as with a wrong convection.
     keeps_branches: bool = eqx.field(static=True, default=False)
+
+    def with_reading_noise(self, noise: float) -> ModelFilter:
+        same = jnp.abs(self.reading_noise - noise) <= SAME_NOISE * self.reading_noise
+        return set_parameters(self, {"reading_noise": jnp.where(same, self.reading_noise, noise)})
 
     def belief_at_rest(self, reading: Scalar) -> tuple[State, Belief]:
         """(state, belief) before the first reading."""

@@ -89,7 +89,9 @@ class PrintedFilter(AbstractEstimator):
     """`system` is the arm, wire and drive that the filter believes in.
 
     `reading_variance` is R, which the source does not print (it calls Q "measurement noise covariance", where its place
-    in eq. 4.21 is that of process noise).
+    in eq. 4.21 is that of process noise). It is a setting of this filter, and not the variance of the loop's sensor
+    (`with_reading_noise` leaves it): a rate from the difference of two readings, and a stress from that of two rates, are bearable
+    with a large R only.
     """
 
     system: System
