@@ -13,8 +13,7 @@ from smajax.control.loop_dataset import Loop
 from smajax.control.mismatch import MISMATCHES, mismatches_of, ratio_of
 from smajax.control.presets import FILTERS
 from smajax.core.names import of_many
-from smajax.core.parameters import check_bounds, parameter_values, parameters, set_parameters
-from smajax.core.units import UnitError, parse_quantity
+from smajax.core.parameters import check_bounds, parameter_values, parameters, quantity, set_parameters
 from smajax.core.wording import and_listed
 from smajax.data.model_catalogue import check_together
 from smajax.model.effects.library import LIBRARY
@@ -22,7 +21,6 @@ from smajax.model.extended import extended, with_effects
 from smajax.model.presets import build
 from smajax.model.system import System
 from smajax.model.wire.laws import under_law
-from smajax.model.wire.order import check_order
 
 PARAMETERS = "`smajax presets WIRE LOAD DRIVE` lists those of a model, `smajax effects` those of effects"
 
@@ -68,7 +66,7 @@ def _value(before: System, system: System, name: str, own: str, value: str | flo
     entry = parameters(system)[own]
     unit = entry.unit
     if not isinstance(value, str):
-        return float(value)
+        return float(quantity(entry, value, name))
     ratio = ratio_of(name, value, plain=unit == "-" and name not in MISMATCHES)
     if ratio is not None:
         if unit == "degC" and own not in MISMATCHES.values():
@@ -88,10 +86,7 @@ def _value(before: System, system: System, name: str, own: str, value: str | flo
                 f"{name}={value.strip()} may be a change without its %, or a value: write '{value.strip()}%' or '{plain:g}'."
             )
         return plain
-    try:
-        return parse_quantity(value, "1" if unit == "-" else unit, also=entry.also)
-    except UnitError as error:
-        raise UnitError(f"{name}: {error}") from None
+    return float(quantity(entry, value, name))
 
 
 def _changed(before: System, own: str, which: str, unit: str) -> float:
@@ -126,7 +121,6 @@ def with_values(system: System, values: Mapping[str, str | float]) -> System:
         wider, {meant: _value(system, wider, name, meant, values[name]) for meant, name in own.items()}
     )
     check_bounds(result)
-    check_order(result)
     return result
 
 

@@ -13,21 +13,23 @@ from smajax.control.closed_loop import ClosedLoopSetup
 from smajax.control.figures_of_merit import SetPointMerit
 from smajax.control.position_unit import unit_of
 from smajax.control.reach import reach_of, reach_sentence
-from smajax.control.run_notes import AboveMelting, EndsEarly, Note, NotFinite, NotResolved
+from smajax.control.run_notes import AboveMelting, AboveStrength, EndsEarly, Note, NotFinite, NotResolved
 from smajax.control.signal_path import check_set_points
-from smajax.data.experiment.magnitude import MELTS
+from smajax.data.experiment.magnitude import MELTS, STRENGTH
 from smajax.model.system import System
-
-SHORTER = 1e-3  # of a run: less of it, that is left out, is not said
+from smajax.simulation.simulate import SHORTER
 
 
 def notes_of_run(data: xr.Dataset) -> list[Note]:
-    """Notes on values that are not finite, on a wire that would melt, and on a run that its integration does not resolve."""
+    """Notes on values that are not finite, on a wire that would melt or tear, and on a run that its integration does not resolve."""
     wrong = tuple(str(name) for name in data.data_vars if not np.isfinite(data[name].to_numpy()).all())
     notes: list[Note] = [NotFinite(wrong)] if wrong else []
     hottest = float(data["temperature"].max())
     if hottest > MELTS:
         notes.append(AboveMelting(hottest))
+    largest = float(data["stress"].max())
+    if largest > STRENGTH:
+        notes.append(AboveStrength(largest))
     error = json.loads(data.attrs.get("integration_error", "{}"))
     share, limit = error.get("largest_rms_over_stroke"), error.get("aimed_for")
     # A run of which the error was not measured has none; one with values that are not finite is said to have these.

@@ -13,7 +13,7 @@ from smajax.control.loop_dataset import Loop
 from smajax.control.measured_state import Sensor
 from smajax.control.presets import CONTROLLERS, check_controller, filter_of
 from smajax.core.names import close_matches
-from smajax.core.units import parse_quantity
+from smajax.core.units import UnitError, parse_quantity
 from smajax.model.system import System
 
 
@@ -75,9 +75,12 @@ def _gains(controller: str, gains: Mapping[str, float | str] | Gains | Path | No
         raise ValueError(f"{controller} has no gain {unknown[0]!r}{close_matches(unknown[0], box, 'tuned are')}.")
     return Gains(
         controller,
-        {name: parse_quantity(value, _unit(units[name]), bare=_unit(units[name])) for name, value in gains.items()},
+        {name: _gain(name, value, "1" if units[name] == "-" else units[name]) for name, value in gains.items()},
     )
 
 
-def _unit(unit: str) -> str:
-    return "1" if unit == "-" else unit
+def _gain(name: str, value: float | str, unit: str) -> float:
+    try:
+        return parse_quantity(value, unit, bare=unit)
+    except UnitError as error:
+        raise UnitError(f"{name}: {error}") from None

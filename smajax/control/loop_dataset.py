@@ -24,10 +24,9 @@ from smajax.core.parameters import check_bounds, parameter_values
 from smajax.data.text_input import clock_of, given
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System
-from smajax.model.wire.order import check_order
 from smajax.simulation.dataset import labelled_run
 from smajax.simulation.integration_error import AUTO, IntegrationError, Tolerance
-from smajax.simulation.simulate import DEFAULT_STEP
+from smajax.simulation.simulate import DEFAULT_STEP, warn_of_length
 
 PERIOD = 0.01  # s, of the controller
 SAMPLED = "sampled"  # attribute of a `reading` that is no state of the plant: the sensor's, held for a control period
@@ -96,13 +95,14 @@ def simulate_loop_dataset(
             f"a {type(system.load).__name__} moves nothing that a controller could lead: give another load."
         )
     check_bounds(system)
-    check_order(system)
     check_interface("", 0.0, period, dt)
     every = round(period / dt)
     wanted = _wanted(set_point, system.load.reading[1], seconds, dt)
     samples = (wanted.position.shape[0] - 1) // every * every + 1
     if samples <= every:
         raise ValueError(f"the run is shorter than one control period of {period:g} s.")
+    if seconds is not None:
+        warn_of_length(seconds, (samples - 1) * dt, dt * every, stacklevel=3)
     wanted = Reference(wanted.position[:samples], wanted.velocity[:samples], wanted.acceleration[:samples])
     key = None if loop.sensor is None else jax.random.key(seed)
     inputs = {name: jnp.asarray(values, dtype=float) for name, values in (disturbance or {}).items()}

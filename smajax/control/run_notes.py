@@ -92,6 +92,13 @@ class AboveMelting:
 
 
 @dataclass(frozen=True)
+class AboveStrength:
+    """The wire is under more stress than it carries."""
+
+    largest: float  # Pa
+
+
+@dataclass(frozen=True)
 class NotResolved:
     """The integration leaves more in the run than is aimed for."""
 
@@ -126,7 +133,15 @@ class TooManySetPoints:
 
 # A string is the text of an error that did not end the run.
 Note: TypeAlias = (
-    InputLeftOut | NotFinite | AboveMelting | NotResolved | EndsEarly | StraightLines | TooManySetPoints | str
+    InputLeftOut
+    | NotFinite
+    | AboveMelting
+    | AboveStrength
+    | NotResolved
+    | EndsEarly
+    | StraightLines
+    | TooManySetPoints
+    | str
 )
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -14,8 +15,11 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from smajax.core.names import of_many
+from smajax.core.units import UnitError, parse_quantity
 
 Module = TypeVar("Module", bound=eqx.Module)
+# Such as +20%, of text that `compose` takes: of a number without a unit it would be read as 0.2.
+_CHANGE = re.compile(r"\s*[+\-\u2212\u00b1]\s*(?:\d+\.?\d*|\.\d+)\s*%\s*")
 
 
 def _as_float_array(value: Any) -> Any:
@@ -87,7 +91,8 @@ def parameters(model: eqx.Module) -> dict[str, Parameter]:
     return result
 
 
-def _lookup(model: Any, path: tuple[str | int, ...]) -> Any:
+def value_at(model: Any, path: tuple[str | int, ...]) -> Any:
+    """The leaf of a model at `Parameter.path`."""
     for key in path:
         model = model[key] if isinstance(key, int) else getattr(model, key)
     return model
@@ -104,7 +109,7 @@ def _select(model: eqx.Module, names: Sequence[str]) -> list[Parameter]:
 
 def get_parameters(model: eqx.Module, names: Sequence[str]) -> Float[Array, " names"]:
     """The values of `names`, in that order, SI."""
-    return jnp.stack([jnp.asarray(_lookup(model, entry.path), dtype=float) for entry in _select(model, names)])
+    return jnp.stack([jnp.asarray(value_at(model, entry.path), dtype=float) for entry in _select(model, names)])
 
 
 def parameter_values(model: eqx.Module) -> dict[str, float]:
@@ -115,17 +120,43 @@ def parameter_values(model: eqx.Module) -> dict[str, float]:
     return dict(zip(names, np.asarray(values, dtype=float).tolist(), strict=True))
 
 
+def quantity(entry: Parameter, value: Any, name: str = "") -> Any:
+    """`value` of a parameter, in its own unit: text is read, with a unit of its own or none, and everything else is as it is.
+
+    name: what messages call the parameter. Raises UnitError for text that is no value, a unit of another kind, and True or False.
+    """
+    name = name or entry.name
+    unit = "1" if entry.unit == "-" else entry.unit
+    if isinstance(value, bool | np.bool_):
+        raise UnitError(f"{name}: got {value}, expected a number{'' if unit == '1' else f' in {unit}'}")
+    if not isinstance(value, str):
+        return value
+    try:
+        return float(value)
+    except ValueError:
+        pass
+    if _CHANGE.fullmatch(value):
+        raise UnitError(
+            f"{name}: got {value!r}, a change of what it is, expected the value; `smajax.compose(..., values=...)` takes changes"
+        )
+    try:
+        return parse_quantity(value, unit, also=entry.also)
+    except UnitError as error:
+        raise UnitError(f"{name}: {error}") from None
+
+
 def set_parameters(model: Module, values: Mapping[str, Any]) -> Module:
     """`model` with the named values put in; everything else is shared.
 
-    Values may be traced, so their bounds are not looked at here: every run does so where it knows them, and `check_bounds`
-    says it before. Raises ValueError when a name is not a parameter of the model.
+    A number is in the parameter's own unit (SI, degC, rad); text may carry another (`"50 g"`). Values may be traced, so their bounds are
+    not looked at here: every run does so where it knows them, and `check_bounds` says it before. Raises ValueError when a name is not a
+    parameter of the model, UnitError (a ValueError) for text that is no value, a unit of another kind, and True or False.
     """
     entries = _select(model, list(values))
     if not entries:
         return model
-    where = lambda m: [_lookup(m, entry.path) for entry in entries]  # noqa: E731
-    return eqx.tree_at(where, model, [_as_float_array(values[entry.name]) for entry in entries])
+    where = lambda m: [value_at(m, entry.path) for entry in entries]  # noqa: E731
+    return eqx.tree_at(where, model, [_as_float_array(quantity(entry, values[entry.name])) for entry in entries])
 
 
 def set_vector(model: Module, names: Sequence[str], vector: Float[Array, " names"]) -> Module:
@@ -134,13 +165,13 @@ def set_vector(model: Module, names: Sequence[str], vector: Float[Array, " names
 
 
 def check_bounds(model: eqx.Module) -> None:
-    """ValueError that names every parameter outside its bounds, with its value and unit.
+    """ValueError that names every parameter outside its bounds, with its value and unit; of a system, and two in the wrong order.
 
-    Values under `jit`, `vmap` or `grad` are not known yet and are passed over.
+    These are transformation temperatures, such as an `austenite_start` that is not below `austenite_finish`, and end stops. Values under `jit`, `vmap` or `grad` are not known yet and are passed over.
     """
     wrong = []
     for entry in parameters(model).values():
-        value = _lookup(model, entry.path)
+        value = value_at(model, entry.path)
         if isinstance(value, jax.core.Tracer):
             continue
         result = np.asarray(value)
@@ -150,12 +181,16 @@ def check_bounds(model: eqx.Module) -> None:
             wrong.append(f"`{entry.name}` = {first:g} {entry.unit} (from {entry.low:g} to {entry.high:g})")
     if wrong:
         raise ValueError(f"outside of the bounds: {'; '.join(wrong)}.")
+    # What a model asks of several of its values together, it says itself.
+    check_together: Callable[[], None] | None = getattr(model, "check_order", None)
+    if check_together is not None:
+        check_together()
 
 
 def inside_bounds(model: eqx.Module) -> Bool[Array, ""]:
     """Whether every parameter lies within its bounds; also of values that are not known yet, lane by lane of a batch."""
     inside = jnp.asarray(True)
     for entry in parameters(model).values():
-        value = _lookup(model, entry.path)
+        value = value_at(model, entry.path)
         inside = inside & jnp.all((value >= entry.low) & (value <= entry.high))  # nan is not
     return inside

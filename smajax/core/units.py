@@ -197,6 +197,8 @@ def parse_quantity(
         number = float(digits)
         if re.match(r",\d", unit):
             raise UnitError(f"got {value!r}, expected a decimal point; write {value.replace(',', '.', 1)!r}")
+    elif isinstance(value, bool):  # which is a number to Python
+        raise UnitError(f"got {value}, expected a number{'' if expected in _DIMENSIONLESS else f' in {expected}'}")
     else:
         number, unit = float(value), ""
         digits = repr(number)

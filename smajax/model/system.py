@@ -20,6 +20,7 @@ from smajax.model.sensor_reading import first_reading
 from smajax.model.types import Inputs, Motion, Scalar, State, WireState
 from smajax.model.wire.constitutive import effect_strain, young_modulus
 from smajax.model.wire.heat import cross_section
+from smajax.model.wire.order import check_order
 from smajax.model.wire.resistance import resistance_per_metre
 from smajax.model.wire.start import start
 from smajax.model.wire.wire import Wire
@@ -45,6 +46,10 @@ class System(eqx.Module):
         if isinstance(self.load, AbstractMovingLoad):
             result["force"] = "N m" if self.load.position_unit == "rad" else "N"
         return result
+
+    def check_order(self) -> None:
+        """ValueError for transformation temperatures or end stops in the wrong order, where they are known."""
+        check_order(self)
 
     @property
     def terms(self) -> Terms:

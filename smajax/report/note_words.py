@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from smajax.control.run_notes import (
     MOST_SET_POINTS,
     AboveMelting,
+    AboveStrength,
     EndsEarly,
     InputLeftOut,
     Note,
@@ -16,7 +17,7 @@ from smajax.control.run_notes import (
     TooManySetPoints,
 )
 from smajax.core.display_units import digits
-from smajax.data.experiment.magnitude import MELTS
+from smajax.data.experiment.magnitude import MELTS, STRENGTH
 from smajax.data.text_input import HELD
 
 
@@ -36,6 +37,11 @@ def _sentence(note: Note) -> str:
             return f"Values that are not finite in {', '.join(variables)}: is the heat or the step too large?"
         case AboveMelting(hottest):
             return f"The wire reaches {hottest:.4g} degC, and it melts at {MELTS:g} degC: is the input's unit right?"
+        case AboveStrength(largest):
+            return (
+                f"The stress reaches {digits(largest / 1e6, 4)} MPa, and no wire carries more than {STRENGTH / 1e6:g} MPa: is the load's unit "
+                "right (of a mass kg), and the wire's diameter?"
+            )
         case NotResolved(share, limit, how, loop):
             sensitive = (
                 " A loop whose controller switches or reaches its limits is sensitive by nature: one switch that comes a sample earlier puts two runs out of step, and then "

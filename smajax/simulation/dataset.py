@@ -17,7 +17,6 @@ from smajax.model.channels import INPUT_UNITS
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System
 from smajax.model.types import Series, State, Trajectory
-from smajax.model.wire.order import check_order
 from smajax.simulation.compiled import measured_run
 from smajax.simulation.integration_error import AUTO, IntegrationError, Tolerance
 from smajax.simulation.measures import SHOWN
@@ -104,6 +103,5 @@ def simulate_dataset(
             "gives the same series with the `integration` that you choose."
         )
     check_bounds(system)
-    check_order(system)
     run, error = measured_run(system, inputs, dt, tolerance, initial, engine)
     return labelled_run(system, run, inputs, error, dt=dt, tolerance="none" if tolerance is None else tolerance)

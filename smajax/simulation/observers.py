@@ -15,8 +15,8 @@ from smajax.model.types import Inputs, Scalar, State
 from smajax.simulation.integrate import AbstractObserver, Observed, Period, Step, with_first
 from smajax.simulation.measures import AbstractMeasure, value_of
 
-# Status codes of a run.
-GOOD, NOT_FINITE, RUNAWAY, UNSOLVED = 0, 1, 2, 3
+# Status codes of a run. `IMPOSSIBLE`: its parameters are out of their bounds or in the wrong order; only a batch, which knows its values, gives it.
+GOOD, NOT_FINITE, RUNAWAY, UNSOLVED, IMPOSSIBLE = 0, 1, 2, 3, 4
 HOTTEST = 3000.0  # C: no wire is hotter, it has molten long before
 COLDEST = -273.15  # C
 

@@ -23,6 +23,7 @@ from smajax.simulation.steppers import ONE_STEP, Integration, Stepper, stepper_o
 # Keeps the arm within 0.05 degrees and the fraction within 1e-3 of the exact solution on the source's rigs, open and
 # closed loop (studies/convergence.py shows error against step).
 DEFAULT_STEP = 0.005  # s
+SHORTER = 1e-3  # of a run: by less than this share of it another end is not said
 
 
 class UnsolvedWarning(UserWarning):
@@ -173,6 +174,15 @@ def warn_of_unsolved(run: Trajectory) -> None:
         "Take a shorter `dt`, or several steps between two samples (`simulate_compiled(..., tolerance=1e-4)`)."
     )
     warnings.warn(text, UnsolvedWarning, stacklevel=3)
+
+
+def warn_of_length(asked: float, end: float, step: float, stacklevel: int) -> None:
+    """Warns of a run that ends at another time than was asked for, for it consists of whole steps; all in s."""
+    if abs(end - asked) > SHORTER * asked:
+        warnings.warn(
+            f"a run ends at {end:g} s, not at the {asked:g} s asked for, because it has whole steps of {step:g} s: give a multiple of these.",
+            stacklevel=stacklevel,
+        )
 
 
 def held_inputs(system: System, series: Mapping[str, Series]) -> dict[str, Series]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -305,3 +306,12 @@ def test_a_melting_wire_is_reported(tmp_path: Path) -> None:
     assert ended.code == 0
     assert "The wire reaches" in ended.said
     assert "and it melts at 1310 degC: is the input's unit right?" in ended.said
+
+
+@pytest.mark.parametrize(("mass", "told"), [("200", "1.11e5 MPa"), ("5", "27.. MPa"), ("3", "")])
+def test_a_stress_that_no_wire_carries_is_reported(tmp_path: Path, mass: str, told: str) -> None:
+    ended = smajax("simulate", *WIRE, "--set", f"load_mass={mass}", "--step", "3V:1s", "--out", tmp_path / "out")
+    assert ended.code == 0
+    words = f"The stress reaches {told}, and no wire carries more than 1900 MPa: is the load's unit right"
+    assert bool(re.search(words, ended.said)) == bool(told)
+    assert ("no wire carries" in ended.said) == bool(told)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -9,7 +11,10 @@ import pytest
 
 from smajax.control.closed_loop import simulate_closed_loop
 from smajax.control.compose import compose
+from smajax.control.loop_around import loop_around
+from smajax.control.loop_dataset import simulate_loop_dataset
 from smajax.core.parameters import check_bounds, set_parameters
+from smajax.core.units import UnitError
 from smajax.model.presets import build
 from smajax.model.system import initial_state
 from smajax.model.wire.laws import under_law
@@ -57,7 +62,7 @@ def test_axes_of_a_batch_that_do_not_match_are_named() -> None:
         grid(voltage=[1.0, np.nan])
     with pytest.raises(ValueError, match="bounds are two finite numbers that rise"):
         sampled(4, voltage=(2.0, 1.0))
-    with pytest.raises(ValueError, match=r"wire_lenght: neither parameters"):
+    with pytest.raises(ValueError, match=r"`wire_lenght` is neither .*; did you mean 'wire_length'\?"):
         run_batch(SYSTEM, {"voltage": 5.0}, grid(wire_lenght=[0.5]), seconds=0.1)
 
 
@@ -96,6 +101,11 @@ def test_a_known_parameter_out_of_its_bounds_is_refused(run) -> None:
     beyond = set_parameters(SYSTEM, {"wire_diameter": -1.0})
     with pytest.raises(ValueError, match=r"outside of the bounds: `wire_diameter` = -1 m \(from"):
         run(beyond, VOLTAGE)
+    late = set_parameters(SYSTEM, {"austenite_start": 90.0})
+    words = r"`austenite_start` = 90 degC is not below `austenite_finish` = .* degC; on heating"
+    for refused in (partial(run, late, VOLTAGE), partial(check_bounds, late)):
+        with pytest.raises(ValueError, match=words):
+            refused()
     with pytest.raises(ValueError, match=r"`wire_diameter` = -1 m \(from"):
         run_batch(beyond, {"voltage": 5.0}, grid(wire_length=[0.5]), seconds=0.1)
     with pytest.raises(ValueError, match=r"`wire_diameter` = -1 m \(from"):
@@ -108,6 +118,8 @@ def test_a_traced_parameter_out_of_its_bounds_is_not_refused() -> None:
 
     slope = by_machine_code(jax.grad(end))
     assert all(np.isfinite(slope(jnp.asarray(share))) for share in (0.5, 1.5))
+    swapped = lambda start: simulate(set_parameters(SYSTEM, {"austenite_start": start}), VOLTAGE).reading  # noqa: E731
+    assert jax.eval_shape(swapped, 500.0).shape == (50,)
 
 
 def test_a_loop_around_a_plant_out_of_its_bounds_is_refused() -> None:
@@ -115,6 +127,42 @@ def test_a_loop_around_a_plant_out_of_its_bounds_is_refused() -> None:
     beyond = set_parameters(loop.system, {"payload_mass": -1.0})
     with pytest.raises(ValueError, match=r"`payload_mass` = -1 kg \(from"):
         simulate_closed_loop(beyond, loop.controller, jnp.full(3, 0.5), 0.01)
+    late = set_parameters(loop.system, {"austenite_start": 90.0})
+    with pytest.raises(ValueError, match=r"`austenite_start` = 90 degC is not below `austenite_finish` = 78 degC"):
+        simulate_closed_loop(late, loop.controller, jnp.full(3, 0.5), 0.01)
+
+
+def test_a_value_with_a_unit_is_read_and_what_is_no_value_is_refused() -> None:
+    arm = build("niti_table_3_1", "arm", "amplified_voltage")
+    for text in ("50 g", "0.05", "0.05 kg"):
+        assert float(set_parameters(arm, {"payload_mass": text}).load.payload_mass) == pytest.approx(0.05)  # type: ignore[attr-defined]
+    for value, words in (
+        ("50 V", "got unit 'V', expected one like 'kg'"),
+        ("heavy", "got 'heavy', expected a number and a unit like '1.5 kg'"),
+        ("+20%", r"got '\+20%', a change of what it is, expected the value; `smajax\.compose"),
+        (True, "got True, expected a number in kg"),
+    ):
+        with pytest.raises(UnitError, match=f"payload_mass: {words}"):
+            set_parameters(arm, {"payload_mass": value})
+    # Of a number without a unit a percentage is a value, and one with a sign a change.
+    assert float(set_parameters(arm, {"start_fraction": "20%"}).start_fraction) == pytest.approx(0.2)
+    for text in ("+20%", "-20 %", "±20%"):
+        with pytest.raises(UnitError, match=r"start_fraction: got .*, a change"):
+            set_parameters(arm, {"start_fraction": text})
+    with pytest.raises(UnitError, match="payload_mass: got True, expected a number in kg"):
+        compose("niti_table_3_1", "arm", "amplified_voltage", values={"payload_mass": True})
+    with pytest.raises(UnitError, match="proportional_gain: got True, expected a number in V/rad"):
+        loop_around(arm, "pid", {"proportional_gain": True})
+
+
+def test_a_run_that_ends_at_another_time_than_asked_says_so() -> None:
+    loop = compose("niti_table_3_1", "arm", "amplified_voltage", controller="pid")
+    with pytest.warns(
+        UserWarning, match=r"ends at 0\.1 s, not at the 0\.12 s asked for, .* whole steps of 0\.05 s"
+    ) as told:
+        found = simulate_loop_dataset(loop, 0.5, seconds=0.12, dt=0.05, period=0.05, tolerance=None)
+    assert float(found["time"][-1]) == pytest.approx(0.1)
+    assert told[0].filename == __file__
 
 
 def test_a_parameter_passed_beside_values_is_an_error_that_names_values() -> None:

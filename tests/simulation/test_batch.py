@@ -35,6 +35,7 @@ from tests.helpers.machine_code import by_machine_code
 from tests.helpers.often import often
 
 ARM = build("niti_table_3_1", "arm", "amplified_voltage")
+UNLIMITED = set_parameters(ARM, {"amplifier_limit": parameters(ARM)["amplifier_limit"].high})
 DT, SECONDS = 0.02, 2.0
 AXES = grid(voltage=[6.0, 8.0, 9.0]) * grid(payload_mass=[0.05, 0.06])
 
@@ -241,19 +242,18 @@ def test_another_batch_in_the_folder_is_not_touched(tmp_path: Path) -> None:
 
 
 def test_runs_that_go_wrong_are_reported_and_change_no_other() -> None:
-    """A negative loss heats without end; a negative mass of no size at all divides by zero."""
-    axes = zipped(convection_coefficient=[70.0, -3000.0, 90.0])
-    with pytest.warns(UserWarning, match="1 of 3 values of `convection_coefficient` are out of its bounds, 1 to 5000"):
-        found = run_batch(ARM, {"voltage": 7.0}, axes, seconds=SECONDS, dt=DT)
+    """Under ten times the voltage a wire heats without end; a torque near the largest number has no finite acceleration."""
+    axes = zipped(convection_coefficient=[70.0, 70.0, 90.0], voltage=[7.0, 70.0, 7.0])
+    found = run_batch(UNLIMITED, {}, axes, seconds=SECONDS, dt=DT)
     assert found["status"].values.tolist() == [0, RUNAWAY, 0]
     assert 0.0 < float(found["first_bad_time"][1]) < SECONDS
-    alone = run_batch(ARM, {"voltage": 7.0}, zipped(convection_coefficient=[70.0, 90.0]), seconds=SECONDS, dt=DT)
+    axes = zipped(convection_coefficient=[70.0, 90.0], voltage=[7.0, 7.0])
+    alone = run_batch(UNLIMITED, {}, axes, seconds=SECONDS, dt=DT)
     np.testing.assert_array_equal(found["position"][[0, 2]], alone["position"])
     assert np.isnan(good(found)["position"][1]).all()
-    assert "1 of 3 runs (33.33%)" in status_summary(found)
-    with pytest.warns(UserWarning, match="such as 0: such runs are simulated all the same"):
-        nothing = run_batch(ARM, {"voltage": 7.0}, zipped(wire_length=[1.0, 0.0]), seconds=SECONDS, dt=DT)
-    assert nothing["status"].values.tolist() == [0, NOT_FINITE]
+    assert "1 of 3 runs (33.33%) went wrong, the first after " in status_summary(found)
+    overflown = run_batch(ARM, {"voltage": 7.0}, grid(load_torque=[0.0, 1e308]), seconds=SECONDS, dt=DT)
+    assert overflown["status"].values.tolist() == [0, NOT_FINITE]
 
 
 @pytest.mark.parametrize(
@@ -262,7 +262,21 @@ def test_runs_that_go_wrong_are_reported_and_change_no_other() -> None:
         (Axes(()), {}, "varies nothing"),
         (grid(voltage=[6.0]), {"every": 3}, "divisor"),
         (grid(voltage=[6.0]), {"seconds": None}, "seconds"),
-        (grid(volts=[6.0]), {}, "neither parameters"),
+        (grid(volts=[6.0]), {}, "`volts` is neither a parameter nor an input"),
+        (
+            grid(voltage=[6.0], payload_mas=[0.05]),
+            {},
+            r"`payload_mas` is .*; did you mean 'payload_mass'\? `smajax\.param",
+        ),
+        (grid(voltage=[6.0]), {"seconds": -1.0}, "`seconds` is the length of the run, a number above zero, not -1.0"),
+        (grid(voltage=[6.0]), {"seconds": float("nan")}, "a number above zero, not nan"),
+        (grid(voltage=[6.0]), {"seconds": "1 s"}, "a number above zero, not '1 s'"),
+        (grid(voltage=[6.0]), {"seconds": 0.001}, "a run of 0.001 s is shorter than a step of 0.02 s"),
+        (
+            grid(voltage=[6.0]),
+            {"measures": (Last("position"),), "slopes": ("payload_mas",)},
+            "not `payload_mas`; did you mean 'payload_mass'",
+        ),
         (grid(payload_mass=[0.1]), {}, "needs the inputs"),
         (grid(voltage=[6.0]), {"keep": ("angle",)}, "martensite_fraction"),
         (grid(ambient_temperature=[20.0]), {"inputs": {"voltage": 6.0, "ambient_temperature": 25.0}}, "of one"),
@@ -295,6 +309,17 @@ def test_wrong_values_of_axes_are_errors() -> None:
         grid(a=[1.0]) * grid(a=[2.0])
     with pytest.raises(ValueError, match="latin-hypercube"):
         sampled(4, a=(0.0, 1.0), method="grid")
+    for count in (3.5, 0, -1, True, "4"):
+        with pytest.raises(ValueError, match=f"a whole number of 1 or more, not {count!r}"):
+            sampled(count, a=(0.0, 1.0))  # type: ignore[arg-type]
+    assert sampled(np.int64(3), a=(0.0, 1.0)).size == 3
+
+
+def test_runs_that_end_at_another_time_than_asked_say_so() -> None:
+    with pytest.warns(UserWarning, match=r"ends at 0\.1 s, not at the 0\.12 s asked for") as told:
+        found = run_batch(ARM, {}, grid(voltage=[6.0]), seconds=0.12, dt=0.05, tolerance=None)
+    assert float(found["time"][-1]) == pytest.approx(0.1)
+    assert told[0].filename == __file__
 
 
 SEVERAL = """

@@ -28,6 +28,8 @@ LARGEST: Mapping[str, tuple[float, str, str]] = MappingProxyType(
     }
 )
 MELTS = 1310.0  # degC, nickel-titanium
+# Pa: no wire carries more. Ultimate tensile strength of nickel-titanium in typical data sheets: about 1000 MPa (annealed) to 1900 MPa (cold drawn).
+STRENGTH = 1.9e9
 WARMS = 5.0  # K above the air: less transforms nothing
 # Shares of the wire's length: more than any alloy recovers and any bias spring bends, and less than expansion by heat.
 LARGEST_STROKE, SMALLEST_STROKE = 0.3, 1e-4

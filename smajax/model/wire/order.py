@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
 import equinox as eqx
 import jax
 import numpy as np
 
-from smajax.core.parameters import get_parameters, parameters
+from smajax.core.parameters import parameters, value_at
 
 # (lower, higher, what that says): the names of parameters.
 RANGES = (
@@ -16,20 +19,45 @@ RANGES = (
 ORDER = (*RANGES, ("lower_stop", "upper_stop", "the load moves between its two end stops"))
 
 
-def disorder(model: eqx.Module) -> tuple[str, str, str] | None:
-    """(lower, higher, what is wrong) of the first pair in the wrong order; None where all is well or not known yet."""
+class Pair(NamedTuple):
+    """Two parameters of known values, of which the first has to be below the second."""
+
+    lower: str
+    higher: str
+    why: str
+    low: np.ndarray  # values of the lower, of any shape
+    high: np.ndarray  # of the higher, of the same shape
+
+    @property
+    def wrong(self) -> np.ndarray:
+        """Where they are not in order, of the same shape."""
+        return np.asarray(self.low >= self.high)
+
+
+def pairs(model: eqx.Module, values: Mapping[str, np.ndarray] | None = None) -> Iterator[Pair]:
+    """The pairs of `ORDER` that `model` has and whose values are known.
+
+    values: those that stand in for the model's own, by name, of one shape.
+    """
     table = parameters(model)
+    put = values or {}
     for lower, higher, why in ORDER:
         if lower not in table or higher not in table:
             continue
-        pair = get_parameters(model, [lower, higher])
-        if isinstance(pair, jax.core.Tracer):
+        low, high = (put[name] if name in put else value_at(model, table[name].path) for name in (lower, higher))
+        if isinstance(low, jax.core.Tracer) or isinstance(high, jax.core.Tracer):
             continue
-        low, high = np.asarray(pair)
-        if np.any(low >= high):
-            unit = table[lower].unit
-            at = f"`{lower}` = {np.ravel(low)[0]:g} {unit} is not below `{higher}` = {np.ravel(high)[0]:g} {unit}"
-            return lower, higher, f"{at}; {why}: exchange or correct the two"
+        yield Pair(lower, higher, why, *np.broadcast_arrays(np.asarray(low), np.asarray(high)))
+
+
+def disorder(model: eqx.Module) -> tuple[str, str, str] | None:
+    """(lower, higher, what is wrong) of the first pair in the wrong order; None where all is well or not known yet."""
+    for one in pairs(model):
+        if one.wrong.any():
+            unit = parameters(model)[one.lower].unit
+            low, high = one.low[one.wrong].ravel()[0], one.high[one.wrong].ravel()[0]
+            at = f"`{one.lower}` = {low:g} {unit} is not below `{one.higher}` = {high:g} {unit}"
+            return one.lower, one.higher, f"{at}; {one.why}: exchange or correct the two"
     return None
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numbers
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -109,13 +110,16 @@ def sampled(
     dimension: str = "sample",
     **more: tuple[float, float],
 ) -> Axes:
-    """`count` points of a box (name -> its two bounds), all on one dimension. The same seed gives the same points."""
+    """`count` points of a box (name -> its two bounds), all on one dimension. The same seed gives the same points.
+
+    Raises ValueError for a `count` that is no whole number, bounds that do not rise, and a way of sampling that there is not.
+    """
     box = {**(bounds or {}), **more}
     wrong = {name: pair for name, pair in box.items() if not (np.isfinite(pair).all() and pair[0] < pair[1])}
     if wrong or not box:
         raise ValueError(f"bounds are two finite numbers that rise, not {wrong or box}.")
-    if count < 1:
-        raise ValueError(f"at least one sample is needed, not {count}.")
+    if isinstance(count, bool) or not isinstance(count, numbers.Integral) or count < 1:
+        raise ValueError(f"`count` is how many samples, a whole number of 1 or more, not {count!r}.")
     low, high = (np.asarray([pair[side] for pair in box.values()], dtype=float) for side in (0, 1))
     if method == "sobol":
         # Drawn up to a power of two, where the sequence is balanced, and cut: scipy warns of any other count.

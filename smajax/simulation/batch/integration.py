@@ -15,6 +15,7 @@ import numpy as np
 from smajax.core.files import json_line
 from smajax.engine import program
 from smajax.simulation.batch.axes import Axes
+from smajax.simulation.batch.impossible import marked
 from smajax.simulation.batch.single_run import Recipe, single_run
 from smajax.simulation.integration_error import (
     IntegrationError,
@@ -78,7 +79,9 @@ def integrated_recipe(recipe: Recipe, axes: Axes, tolerance: Tolerance) -> tuple
         if tolerance is None:
             return None, {}
         own = dataclasses.replace(plain, integration=integration)
-        return None, _outputs(program(single_run, own, tuple(axes.names))(own, some, threads=1), names)
+        found = program(single_run, own, tuple(axes.names))(own, some, threads=1)
+        # Runs with impossible values decide nothing.
+        return None, _outputs(marked(recipe.system, some, found), names)
 
     choices = coarse_to_fine(recipe.system, bool(recipe.slopes))
     integration, error, _ = integrated(run, recipe.system, tolerance, choices, ways)

@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.core.names import listed
+from smajax.core.names import close_matches, listed, of_many
 from smajax.core.parameters import Parameter, check_bounds, parameters
 from smajax.model.system import System
 from smajax.model.types import Scalar, Series
-from smajax.model.wire.order import check_order
 from smajax.simulation.batch.axes import Axes
+from smajax.simulation.batch.impossible import warn_of_impossible
 from smajax.simulation.batch.single_run import Recipe
 from smajax.simulation.compiled import check_tolerance
 from smajax.simulation.integration_error import AUTO, Tolerance, with_tolerance
 from smajax.simulation.measures import SHOWN, AbstractMeasure
-from smajax.simulation.simulate import DEFAULT_STEP, check_kinds, check_scalars
+from smajax.simulation.simulate import DEFAULT_STEP, check_kinds, check_scalars, warn_of_length
 from smajax.simulation.steppers import ONE_STEP
 
 STORED = ("position", "temperature", "martensite_fraction", "stress")
@@ -64,8 +63,7 @@ def recipe_of(
     table = parameters(system)
     check_scalars(system, settings.dt)
     check_bounds(system)
-    check_order(system)
-    _warn_beyond(axes, table)
+    warn_of_impossible(system, axes)
     sorted_inputs = _sorted_inputs(system, inputs, axes, table)
     steps = _steps(sorted_inputs.series, settings)
     _check_stored(settings, steps)
@@ -99,20 +97,9 @@ def _check_measures(measures: Sequence[object]) -> None:
         raise TypeError(f"`measures` holds {other[0]!r}; expected measures, such as `sma.measure.Largest('position')`.")
 
 
-def _warn_beyond(axes: Axes, table: Parameters) -> None:
-    """Warns of values that no wire or load has: what comes of them may look like a result."""
-    for dimension in axes.dimensions:
-        for name, values in dimension.values.items():
-            if name not in table:
-                continue
-            low, high = table[name].low, table[name].high
-            beyond = values[~((values >= low) & (values <= high))]
-            if beyond.size:
-                warnings.warn(
-                    f"{beyond.size} of {values.size} values of `{name}` are out of its bounds, {low:g} to {high:g} {table[name].unit}, "
-                    f"such as {beyond[0]:g}: such runs are simulated all the same, and what comes of them means nothing.",
-                    stacklevel=4,
-                )
+def _lists(inputs: Collection[str]) -> str:
+    """Where the names of parameters and inputs are."""
+    return f"`smajax.parameter_values(system)` lists its parameters, and its inputs are {listed(sorted(inputs))}"
 
 
 def _sorted_inputs(system: System, inputs: Mapping[str, Series | float], axes: Axes, table: Parameters) -> _Inputs:
@@ -124,7 +111,7 @@ def _sorted_inputs(system: System, inputs: Mapping[str, Series | float], axes: A
     unknown = [name for name in axes.names if name not in table and name not in channels]
     if unknown:
         raise ValueError(
-            f"{listed(unknown)}: neither parameters ({listed(sorted(table))}) nor inputs ({listed(sorted(known))}) of the system."
+            f"`{unknown[0]}` is neither a parameter nor an input of the system{of_many(unknown[0], [*table, *known], _lists(known))}."
         )
     twice = sorted(set(axes.names) & set(inputs))
     if twice:
@@ -143,6 +130,12 @@ def _sorted_inputs(system: System, inputs: Mapping[str, Series | float], axes: A
     return _Inputs(series, {name: values for name, values in arrays.items() if values.ndim == 0}, channels)
 
 
+def _is_length(seconds: object) -> bool:
+    if isinstance(seconds, str | bool) or np.ndim(seconds) != 0:
+        return False
+    return 0.0 < np.asarray(seconds, dtype=float) < np.inf
+
+
 def _steps(series: Mapping[str, Series], settings: BatchSettings) -> int:
     """How many steps a run has."""
     seconds, dt, every = settings.seconds, settings.dt, settings.every
@@ -151,9 +144,17 @@ def _steps(series: Mapping[str, Series], settings: BatchSettings) -> int:
         raise ValueError(f"input series must be of one length, but there are {lengths}.")
     if seconds is None and not lengths:
         raise ValueError("no input is a series: give `seconds`, the length of the run.")
+    if seconds is not None and not _is_length(seconds):
+        raise ValueError(f"`seconds` is the length of the run, a number above zero, not {seconds!r}.")
     steps = next(iter(lengths.values())) - 1 if lengths else round(float(seconds or 0.0) / dt)
     if lengths and seconds is not None and steps != round(seconds / dt):
         raise ValueError(f"series of {steps + 1} samples last {steps * dt:g} s at {dt:g} s, not {seconds:g} s.")
+    if seconds is not None and steps < 1:
+        raise ValueError(
+            f"a run of {seconds:g} s is shorter than a step of {dt:g} s: give a smaller `dt`, or more `seconds`."
+        )
+    if seconds is not None:
+        warn_of_length(seconds, steps * dt, dt, stacklevel=5)
     if steps < 1 or every < 1 or steps % every:
         raise ValueError(f"{steps} steps cannot be stored every {every}: give a divisor of the number of steps.")
     return steps
@@ -162,7 +163,9 @@ def _steps(series: Mapping[str, Series], settings: BatchSettings) -> int:
 def _check_stored(settings: BatchSettings, steps: int) -> None:
     wrong = sorted(set(settings.keep) - set(SHOWN))
     if wrong:
-        raise ValueError(f"`keep` names what a state shows, {listed(sorted(SHOWN))}, not {listed(wrong)}.")
+        raise ValueError(
+            f"`keep` names what a state shows, not {wrong[0]!r}{close_matches(wrong[0], sorted(SHOWN), 'there are')}."
+        )
     names = [one.name for one in settings.measures]
     if len(set(names)) < len(names):
         raise ValueError(f"measures must have names of their own, but there are {names}.")
@@ -175,8 +178,9 @@ def _check_slopes(settings: BatchSettings, table: Parameters, channels: Sequence
     wrong = [name for name in slopes if name not in table and name not in channels]
     if wrong:
         raise ValueError(
-            f"`slopes` names parameters ({listed(sorted(table))}) or inputs that `axes` vary ({listed(sorted(channels))}), "
-            f"not {listed(wrong)}. An input that is the same for all may be an axis of one value."
+            f"`slopes` names parameters or inputs that `axes` vary ({listed(sorted(channels))}), not `{wrong[0]}`"
+            f"{of_many(wrong[0], [*table, *channels], '`smajax.parameter_values(system)` lists the parameters')}. "
+            "An input that is the same for all may be an axis of one value."
         )
     if len(set(slopes)) < len(slopes):
         raise ValueError(f"`slopes` names something twice: {listed(slopes)}.")

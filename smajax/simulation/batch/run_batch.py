@@ -18,6 +18,7 @@ from smajax.model.system import System
 from smajax.model.types import Series
 from smajax.simulation.batch.axes import Axes
 from smajax.simulation.batch.chunks import chunk_size, chunks, result_shapes
+from smajax.simulation.batch.impossible import marked
 from smajax.simulation.batch.integration import INTEGRATION, as_stored, attributes_of, integrated_recipe
 from smajax.simulation.batch.recipe import STORED, BatchSettings, recipe_of
 from smajax.simulation.batch.single_run import Recipe, single_run
@@ -25,7 +26,7 @@ from smajax.simulation.batch.store import DIGEST, Store
 from smajax.simulation.dataset import errors_by_variable
 from smajax.simulation.integration_error import AUTO, Tolerance
 from smajax.simulation.measures import AbstractMeasure
-from smajax.simulation.observers import GOOD
+from smajax.simulation.observers import GOOD, IMPOSSIBLE
 from smajax.simulation.simulate import DEFAULT_STEP
 
 BUDGET = 1 << 30  # bytes
@@ -73,7 +74,7 @@ def run_batch(  # the public form: what goes inwards is a `BatchSettings`
     parameters together in less than four times the time of the run, those of each further measure in two or three times more, in memory
     that grows as the square root of its steps. Those of a run that went wrong mean nothing: `good` leaves them out.
 
-    The result has the dimensions of `axes` and `time`, `status` (0 good, 1 a number that is not finite, 2 runaway heat, 3 a stage that did not converge) and
+    The result has the dimensions of `axes` and `time`, `status` (0 good, 1 a number that is not finite, 2 runaway heat, 3 a stage that did not converge, 4 impossible parameters) and
     `first_bad_time`. Results take a quarter of `budget` bytes at a time, or of half of the memory that is left. With `out` they are streamed to a Zarr group
     there, and the same call resumes where an earlier one was stopped; the data set returned then reads from disk, as
     `smajax.simulation.batch.run_batch.opened(out)` does by itself.
@@ -81,9 +82,9 @@ def run_batch(  # the public form: what goes inwards is a `BatchSettings`
     On a processor the batch is machine code (`smajax.engine`), five to twenty times as fast as by XLA; `engine="xla"` asks for the other
     (they agree to 1e-12 of a run), and where only XLA can do it, it does.
 
-    A run whose values are out of their bounds is simulated as it is, with a warning: `status` marks numbers that are not finite and
-    runaway heat, not of what cannot be.
-    Raises ValueError for what does not fit together, a parameter of `system` out of its bounds, and when `out` holds another batch.
+    A run whose parameters are out of their bounds, or transformation temperatures or end stops in the wrong order, is simulated as it is, with a
+    warning and with status 4, whatever else went wrong in it.
+    A length that is no multiple of `dt` ends at the nearest one, with a warning. Raises ValueError for what does not fit together, a parameter of `system` out of its bounds, and when `out` holds another batch.
     """
     progress = as_progress(progress)
     settings = BatchSettings(seconds, dt, every, keep, measures, tolerance, slopes)
@@ -97,7 +98,7 @@ def run_batch(  # the public form: what goes inwards is a `BatchSettings`
     parts: list[dict[str, np.ndarray]] = []
     count = -(-axes.size // size)
     for number, result in chunks(single_run, recipe, axes, size, range(count), devices, engine):
-        parts.append(result)
+        parts.append(_of_chunk(recipe, axes, size, number, result))
         progress(Stage("simulating", (number + 1) / count))
     whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     time = np.arange(recipe.steps // every + 1) * every * dt
@@ -176,8 +177,15 @@ def fill(
     for done, (number, result) in enumerate(
         chunks(single_run, recipe, store.axes, store.chunk, wanted, devices, engine), start=1
     ):
-        store.write(number, result)
+        store.write(number, _of_chunk(recipe, store.axes, store.chunk, number, result))
         progress(Stage("simulating", done / len(wanted)))
+
+
+def _of_chunk(
+    recipe: Recipe, axes: Axes, size: int, number: int, result: Mapping[str, np.ndarray]
+) -> dict[str, np.ndarray]:
+    """What chunk `number` gave, with the runs marked whose values are impossible."""
+    return marked(recipe.system, axes.runs(number * size, min((number + 1) * size, axes.size)), result)
 
 
 def _with_unit(units: Mapping[str, str], name: str) -> dict[str, str]:
@@ -235,13 +243,18 @@ def good(result: xr.Dataset) -> xr.Dataset:
 
 
 def status_summary(result: xr.Dataset) -> str:
-    """How many runs went wrong, and when first, in a sentence."""
+    """How many runs went wrong, how many of them by parameters that are impossible, and when first, in a sentence."""
     status = np.asarray(result["status"])
     bad = int((status != GOOD).sum())
     if not bad:
         return f"All {status.size:,} runs ran to their end."
-    when = float(np.nanmin(np.where(status != GOOD, np.asarray(result["first_bad_time"]), np.nan)))
+    cannot_be = int((status == IMPOSSIBLE).sum())
+    why = f"{cannot_be:,} with impossible parameters (out of their bounds, or in the wrong order)" if cannot_be else ""
+    if bad > cannot_be:
+        on_the_way = (status != GOOD) & (status != IMPOSSIBLE)
+        when = float(np.asarray(result["first_bad_time"])[on_the_way].min())
+        why = f"{why}, of the others the first after {when:g} s" if why else f"the first after {when:g} s"
     return (
-        f"{bad:,} of {status.size:,} runs ({bad / status.size:.2%}) went wrong, the first after {when:g} s: `status` "
-        "says which, and `good` leaves them out."
+        f"{bad:,} of {status.size:,} runs ({bad / status.size:.2%}) went wrong, {why}: `status` says which, and `good` "
+        "leaves them out."
     )
