@@ -135,7 +135,7 @@ def test_a_loop_around_a_plant_out_of_its_bounds_is_refused() -> None:
 def test_a_value_with_a_unit_is_read_and_what_is_no_value_is_refused() -> None:
     arm = build("niti_table_3_1", "arm", "amplified_voltage")
     for text in ("50 g", "0.05", "0.05 kg"):
-        assert float(set_parameters(arm, {"payload_mass": text}).load.payload_mass) == pytest.approx(0.05)  # type: ignore[attr-defined]
+        assert float(set_parameters(arm, {"payload_mass": text}).load.payload_mass) == pytest.approx(0.05)
     for value, words in (
         ("50 V", "got unit 'V', expected one like 'kg'"),
         ("heavy", "got 'heavy', expected a number and a unit like '1.5 kg'"),

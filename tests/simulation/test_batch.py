@@ -312,7 +312,7 @@ def test_wrong_values_of_axes_are_errors() -> None:
     for count in (3.5, 0, -1, True, "4"):
         with pytest.raises(ValueError, match=f"a whole number of 1 or more, not {count!r}"):
             sampled(count, a=(0.0, 1.0))  # type: ignore[arg-type]
-    assert sampled(np.int64(3), a=(0.0, 1.0)).size == 3
+    assert sampled(np.int64(3), a=(0.0, 1.0)).size == 3  # type: ignore[arg-type]
 
 
 def test_runs_that_end_at_another_time_than_asked_say_so() -> None:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import numbers
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy  # its parts are imported when they are first used
@@ -118,7 +118,8 @@ def sampled(
     wrong = {name: pair for name, pair in box.items() if not (np.isfinite(pair).all() and pair[0] < pair[1])}
     if wrong or not box:
         raise ValueError(f"bounds are two finite numbers that rise, not {wrong or box}.")
-    if isinstance(count, bool) or not isinstance(count, numbers.Integral) or count < 1:
+    given: Any = count  # of whoever does not check types
+    if isinstance(given, bool) or not isinstance(given, int | np.integer) or given < 1:
         raise ValueError(f"`count` is how many samples, a whole number of 1 or more, not {count!r}.")
     low, high = (np.asarray([pair[side] for pair in box.values()], dtype=float) for side in (0, 1))
     if method == "sobol":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -130,10 +131,10 @@ def _sorted_inputs(system: System, inputs: Mapping[str, Series | float], axes: A
     return _Inputs(series, {name: values for name, values in arrays.items() if values.ndim == 0}, channels)
 
 
-def _is_length(seconds: object) -> bool:
+def _is_length(seconds: Any) -> bool:
     if isinstance(seconds, str | bool) or np.ndim(seconds) != 0:
         return False
-    return 0.0 < np.asarray(seconds, dtype=float) < np.inf
+    return bool(0.0 < np.asarray(seconds, dtype=float) < np.inf)
 
 
 def _steps(series: Mapping[str, Series], settings: BatchSettings) -> int:
