@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
+import xarray as xr
 
 from smajax.control.compose import compose
 from smajax.control.found_notes import notes_of_cycle
-from smajax.control.run_notes import CycleLeavesStrain
+from smajax.control.run_notes import CycleLeavesStrain, Note
 from smajax.core.parameters import set_parameters
 from smajax.model.presets import WIRES
 from smajax.model.rigs import arm
@@ -28,9 +30,13 @@ def _weight(law: str = "", **values: float) -> System:
     return set_parameters(compose("flexinol_table_3_2", "dead_weight", "flexinol_voltage", law=law), values)
 
 
-def _left(system: System, volts: np.ndarray, cycles: int) -> tuple[float, list[CycleLeavesStrain]]:
+def _run(volts: np.ndarray, system: System) -> xr.Dataset:
+    return simulate_dataset(system, {"voltage": jnp.asarray(volts)}, DT, 1e-4)
+
+
+def _left(system: System, volts: np.ndarray, cycles: int) -> tuple[float, list[Note]]:
     """(strain that a cycle leaves in %, what is noted of the run)."""
-    data = simulate_dataset(system, {"voltage": volts}, DT, 1e-4)
+    data = _run(volts, system)
     strain = data["strain"].to_numpy()
     return 100.0 * (strain[-1] - strain[0]) / cycles, notes_of_cycle(system, data)
 
@@ -51,7 +57,7 @@ def test_stress_that_changes_with_the_fraction_leaves_a_strain_where_the_modulus
     left, notes = _left(_weight(**values), volts, cycles)
     assert left == pytest.approx(percent, abs=0.002)
     said = [left * cycles] if abs(left * cycles) > 0.05 else []
-    assert [100.0 * one.strain for one in notes] == pytest.approx(said, abs=1e-4)
+    assert [100.0 * one.strain for one in notes if isinstance(one, CycleLeavesStrain)] == pytest.approx(said, abs=1e-4)
 
 
 @pytest.mark.parametrize("volts", [STEPS, RAMPS])
@@ -74,9 +80,9 @@ def test_the_law_integrated_is_the_enhanced_one_but_for_the_form_and_no_other_ch
 
 
 def test_nothing_is_noted_of_a_run_that_ends_elsewhere_or_of_a_wire_with_an_effect():
-    hot = simulate_dataset(_weight(), {"voltage": STEPS[:601]}, DT, 1e-4)
+    hot = _run(STEPS[:601], _weight())
     assert notes_of_cycle(_weight(), hot) == []
-    cold = simulate_dataset(_weight(), {"voltage": STEPS}, DT, 1e-4)
+    cold = _run(STEPS, _weight())
     (note,) = notes_of_cycle(_weight(), cold)
     longer, shorter = note_sentences([note, CycleLeavesStrain(-0.0012)])
     assert "0.4 % of its length longer: in rate form, the default, cycles do not close (docs/limits.md)" in longer

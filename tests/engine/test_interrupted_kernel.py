@@ -19,7 +19,7 @@ from tests.helpers.engine_results import summed
 def _pieces(seconds_a_vector: float, last: int, group: int, monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, int]]:
     """What machine code that takes `seconds_a_vector` is called for."""
     clock, called = [0.0], []
-    monkeypatch.setattr(kernel.time, "perf_counter", lambda: clock[0])
+    monkeypatch.setattr(time, "perf_counter", lambda: clock[0])
 
     def call(first: int, end: int) -> None:
         called.append((first, end))
