@@ -77,6 +77,10 @@ def page_of_controllers() -> str:
     for name, law in LAWS.items():
         parts = (type(law.shape).__name__, type(law.conditions).__name__, type(law.variants()).__name__)
         lines.append(f"| `{name}` | {' | '.join(parts)} | {law.source} |")
+    lines += [
+        "",
+        "`integrated` has the integrated form of the constitutive law too (eq. 4.51); under the others it is the wire's, in rates.",
+    ]
     split = detwinning()
     start, finish = (float(value) / 1e6 for value in get_parameters(split, list(parameters(split))))
     lines += [

@@ -67,7 +67,11 @@ DriveName = Annotated[
 ]
 LawName = Annotated[
     str,
-    typer.Option("--law", help="kinetics: tanaka, liang, brinson or enhanced", autocompletion=completion.laws),
+    typer.Option(
+        "--law",
+        help="kinetics: tanaka, liang, brinson or enhanced; integrated: enhanced, with strain a function of state, so that cycles close",
+        autocompletion=completion.laws,
+    ),
 ]
 Changes = Annotated[
     list[str] | None,

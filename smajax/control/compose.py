@@ -165,6 +165,7 @@ def compose(
 ) -> System | Loop:
     """Presets by name, under a kinetics law, with effects and parameters of one's own: a system, or a loop around it.
 
+    law: of `LAWS` (`smajax.model.wire.laws`): the kinetics, or `integrated`, under which every cycle closes; "" for the wire's own.
     values: parameter -> a number (SI, temperatures in degC, angles in rad), text with a unit (`"80 W/m^2/K"`), or a change of
     the preset's value (`"+20%"`, `"-50%"`); by its name, its place in the model, or a name of `MISMATCHES`. An effect is part
     of the model when one of its parameters is given (`latent_heat.enthalpy`).

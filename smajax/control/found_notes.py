@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 
+import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 
@@ -13,11 +14,25 @@ from smajax.control.closed_loop import ClosedLoopSetup
 from smajax.control.figures_of_merit import SetPointMerit
 from smajax.control.position_unit import unit_of
 from smajax.control.reach import reach_of, reach_sentence
-from smajax.control.run_notes import AboveMelting, AboveStrength, EndsEarly, Note, NotFinite, NotResolved
+from smajax.control.run_notes import (
+    AboveMelting,
+    AboveStrength,
+    CycleLeavesStrain,
+    EndsEarly,
+    Note,
+    NotFinite,
+    NotResolved,
+)
 from smajax.control.signal_path import check_set_points
 from smajax.data.experiment.magnitude import MELTS, STRENGTH
 from smajax.model.system import System
+from smajax.model.wire.constitutive import young_modulus
+from smajax.model.wire.form import RateForm
 from smajax.simulation.simulate import SHORTER
+
+WHOLE = 1e-3  # of the martensite fraction: nearer to 1 is martensite alone
+SAME_TEMPERATURE = 1.0  # K
+LEFT = 5e-4  # strain that a cycle leaves; less is not said
 
 
 def notes_of_run(data: xr.Dataset) -> list[Note]:
@@ -36,6 +51,21 @@ def notes_of_run(data: xr.Dataset) -> list[Note]:
     if not wrong and share is not None and limit is not None and share > limit:
         notes.append(NotResolved(share, limit, error["how"], loop="controller" in data.attrs))
     return notes
+
+
+def notes_of_cycle(system: System, data: xr.Dataset) -> list[Note]:
+    """A note on a strain that whole cycles leave in rate form; none of a wire with effects or split martensite, which have strains of their own that stay."""
+    wire = system.wire
+    if not isinstance(wire.constitutive.form, RateForm) or system.effects or wire.kinetics.variants.detwins:
+        return []
+    fraction, temperature, stress, strain = (
+        data[name].to_numpy()[[0, -1]] for name in ("martensite_fraction", "temperature", "stress", "strain")
+    )
+    taut = np.all(stress > 0.0)  # the strain of a slack wire is its load's
+    if not (taut and np.all(fraction > 1.0 - WHOLE) and abs(np.diff(temperature)[0]) < SAME_TEMPERATURE):
+        return []
+    left = float(np.diff(strain)[0] - np.diff(stress)[0] / float(young_modulus(wire, jnp.asarray(1.0))))
+    return [CycleLeavesStrain(left)] if abs(left) > LEFT else []
 
 
 def notes_of_length(asked: float, clock: np.ndarray, step: float) -> list[Note]:

@@ -109,6 +109,13 @@ class NotResolved:
 
 
 @dataclass(frozen=True)
+class CycleLeavesStrain:
+    """The wire comes back to where it began with another strain, by the rate form of the constitutive law."""
+
+    strain: float  # at the end less at the start, without the elastic strain of another stress, -
+
+
+@dataclass(frozen=True)
 class EndsEarly:
     """The run ends before the time that was asked for, at its last whole step, or control period of a loop."""
 
@@ -138,6 +145,7 @@ Note: TypeAlias = (
     | AboveMelting
     | AboveStrength
     | NotResolved
+    | CycleLeavesStrain
     | EndsEarly
     | StraightLines
     | TooManySetPoints

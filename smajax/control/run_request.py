@@ -18,7 +18,13 @@ from smajax.control.closed_loop import ClosedLoopSetup, check_answers
 from smajax.control.compiled_loop import measured_loop
 from smajax.control.compose import compose, with_values
 from smajax.control.figures_of_merit import SetPointMerit, merit_by_set_point, set_point_spans
-from smajax.control.found_notes import notes_of_length, notes_of_reach, notes_of_run, notes_of_set_points
+from smajax.control.found_notes import (
+    notes_of_cycle,
+    notes_of_length,
+    notes_of_reach,
+    notes_of_run,
+    notes_of_set_points,
+)
 from smajax.control.gains_file import Gains, read_gains
 from smajax.control.loop_dataset import labelled_loop
 from smajax.control.loop_settings import LoopInUse, LoopSettings, joined, settings_of
@@ -204,6 +210,7 @@ def run_open(request: RunRequest) -> RunResult:
         *left_out,
         *notes_of_length(length_of(list(several.values()), request.seconds), clock, request.dt),
         *notes_of_run(data),
+        *notes_of_cycle(system, data),
     ]
     data = _with_measured(request, system, data)
     return RunResult(data, system, {}, tuple(notes))

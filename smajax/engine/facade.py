@@ -12,7 +12,9 @@ import warnings
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import partial
+from threading import Event
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, cast, get_args
 
 import jax
@@ -22,6 +24,7 @@ from smajax.core.operating_system import WINDOWS, available_cores
 from smajax.engine import xla
 from smajax.engine.arguments import check_arguments, checked_threads, key_of, signature
 from smajax.engine.cache import versions
+from smajax.engine.kernel import Stopped
 from smajax.engine.text import Unsupported
 from smajax.engine.traced import Function, Traced
 
@@ -49,6 +52,17 @@ UNTRIED = (
 )
 
 
+@dataclass(frozen=True)
+class Coming:
+    """Results that are on their way: to be called for them, or stopped where they are no longer wanted (which XLA does not)."""
+
+    result: Callable[[], Any]
+    stop: Callable[[], None] = lambda: None
+
+    def __call__(self) -> Any:
+        return self.result()
+
+
 class Program:
     """`function(model, own)` of one run, for many: `program(model, own)`.
 
@@ -70,10 +84,12 @@ class Program:
         self._made_for, self._names = signature(model), names
         self._blocks = xla.BlockLengths()
 
-    def __call__(self, model: Any, own: dict[str, np.ndarray], threads: int | None = None) -> Any:
+    def __call__(
+        self, model: Any, own: dict[str, np.ndarray], threads: int | None = None, stop: Event | None = None
+    ) -> Any:
         """What the function gives, arrays of numpy, every leaf with one row a run; `own` are arrays of shape (runs,).
 
-        `threads` of machine code: by default as many as there are cores.
+        `threads` of machine code: by default as many as there are cores. It raises Stopped soon after another thread has set `stop`.
         """
         check_arguments(self._made_for, self._names, model, own)
         threads = available_cores() if threads is None else checked_threads(threads)
@@ -81,7 +97,9 @@ class Program:
         if native is None:
             return xla.evaluated(self._function, model, own, self._alone, self._blocks)
         try:
-            return native(model, own, threads)
+            return native(model, own, threads, stop)
+        except Stopped:
+            raise
         except Exception as error:
             if not self._replaceable:
                 raise
@@ -105,21 +123,21 @@ class Program:
         devices: tuple[jax.Device, ...],
         block: int,
         room: int,
-    ) -> Callable[[], Any]:
+    ) -> Coming:
         """The same beside the caller, who gets the results by calling what this gives.
 
         `devices`, `block` and `room` (runs that one compilation has room for) are of XLA, `threads` of machine code.
         """
         check_arguments(self._made_for, self._names, model, own)
         if self.native is None:
-            return xla.started(self._function, model, own, devices, block, room)
-        pool = ThreadPoolExecutor(1)
+            return Coming(xla.started(self._function, model, own, devices, block, room))
+        pool, stop = ThreadPoolExecutor(1), Event()
         try:
-            coming = pool.submit(self, model, own, threads)
+            coming = pool.submit(self, model, own, threads, stop)
         except RuntimeError:  # no room for another thread under a cap on memory: done when it is asked for
-            return partial(self, model, own, threads)
+            return Coming(partial(self, model, own, threads))
         pool.shutdown(wait=False)
-        return coming.result
+        return Coming(coming.result, stop.set)
 
 
 def engine_of(requested: str = "auto") -> Engine:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import ctypes
 import struct
-from collections.abc import Sequence
+import threading
+import time
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -30,6 +32,9 @@ COMPILE_OPTIONS = {
 QUICK = {"codegen_level": 0}
 # Characters of a program beyond which LLVM's passes on loops cost more than they gain: half of its time or more, for a twentieth of a run's.
 LONG = 800_000
+# Machine code answers no Ctrl-C, so it is called for some groups of runs at a time: for as long as this, and at most so many times as many groups as before.
+PIECE_SECONDS = 0.25
+GROWTH = 4
 
 
 def options_of(quickly: bool) -> dict[str, Any]:
@@ -167,13 +172,33 @@ def _check_symbols(code: bytes) -> None:
         )
 
 
+class Stopped(Exception):
+    """The caller no longer wants the results."""
+
+
+def in_pieces(call: Callable[[int, int], None], first: int, last: int, group: int, stop: threading.Event) -> None:
+    """`call` for all vectors from `first` to `last`, whole groups at a time; as many as take `PIECE_SECONDS`, by the pieces before.
+
+    Raises Stopped where `stop` is set before the last piece.
+    """
+    size = group
+    while first < last:
+        if stop.is_set():
+            raise Stopped("stopped before all runs were done")
+        end, begun = min(first + size, last), time.perf_counter()
+        call(first, end)
+        groups = PIECE_SECONDS * (end - first) / (group * max(time.perf_counter() - begun, 1e-9))
+        first, size = end, group * max(1, int(min(groups, GROWTH * size / group)))
+
+
 class Kernel:
     """Machine code as a function of whole arrays. Threads share nothing but what they read. Raises UnresolvedSymbol."""
 
-    def __init__(self, code: bytes, lanes: int, results: Sequence[Array], scratch: int) -> None:
+    def __init__(self, code: bytes, lanes: int, results: Sequence[Array], scratch: int, group: int = 1) -> None:
+        """`group`: vectors that the machine code runs side by side."""
         import llvmlite.binding as llvm
 
-        self._lanes, self._results, self.scratch = lanes, tuple(results), scratch
+        self._lanes, self._results, self.scratch, self._group = lanes, tuple(results), scratch, group
         self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
         _check_symbols(code)  # after the compiler, which makes the process's own functions known
         self._engine.add_object_file(llvm.ObjectFileRef.from_data(code))
@@ -182,8 +207,13 @@ class Kernel:
         kind = ctypes.CFUNCTYPE(None, pointer, pointer, pointer, pointer, number, number)
         self._call = kind(self._engine.get_function_address(NAME))
 
-    def __call__(self, shared: Sequence[np.ndarray], own: Sequence[np.ndarray], threads: int) -> list[np.ndarray]:
-        """`own` are arrays of shape (runs,), `shared` of the shapes traced; results have shape (runs, ...)."""
+    def __call__(
+        self, shared: Sequence[np.ndarray], own: Sequence[np.ndarray], threads: int, stop: threading.Event | None = None
+    ) -> list[np.ndarray]:
+        """`own` are arrays of shape (runs,), `shared` of the shapes traced; results have shape (runs, ...).
+
+        Ends some tenths of a second after Ctrl-C in the thread that calls, or, with Stopped, after another has set `stop`.
+        """
         runs = len(own[0])
         count = -(-runs // self._lanes)
         room = count * self._lanes
@@ -191,17 +221,26 @@ class Kernel:
         results = [np.empty((room, *one.shape), one.dtype) for one in self._results]
         tables = [self._pointers(arrays) for arrays in (shared, filled, results)]
         edges = np.linspace(0, count, min(threads, count) + 1).astype(int)
+        stopped = threading.Event() if stop is None else stop
 
         def part(first: int, last: int) -> None:
             scratch = _aligned(self.scratch)
-            self._call(*tables, scratch.ctypes.data, first, last)
+
+            def call(begin: int, end: int) -> None:
+                self._call(*tables, scratch.ctypes.data, begin, end)
+
+            in_pieces(call, first, last, self._group, stopped)
 
         if len(edges) == 2:
             part(0, count)
             return [one[:runs] for one in results]
         try:
             with ThreadPoolExecutor(len(edges) - 1) as pool:
-                list(pool.map(part, edges[:-1].tolist(), edges[1:].tolist()))
+                try:
+                    list(pool.map(part, edges[:-1].tolist(), edges[1:].tolist()))
+                except KeyboardInterrupt:  # the pool waits for its threads
+                    stopped.set()
+                    raise
         except RuntimeError:  # no room for another thread under a cap on memory: this one does it all
             part(0, count)
         return [one[:runs] for one in results]

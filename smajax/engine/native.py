@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
+from threading import Event
 from typing import Any
 
 import equinox as eqx
@@ -46,8 +47,8 @@ class NativeProgram:
             with compiling():
                 wait([self._kernel])
 
-    def __call__(self, model: Any, own: dict[str, np.ndarray], threads: int) -> Any:
-        """What the function gives, every leaf with one row a run; `own` are arrays of shape (runs,)."""
+    def __call__(self, model: Any, own: dict[str, np.ndarray], threads: int, stop: Event | None = None) -> Any:
+        """What the function gives, every leaf with one row a run; `own` are arrays of shape (runs,). Raises Stopped once `stop` is set."""
         leaves = jax.tree.leaves(eqx.filter(model, is_array))
         shared = [
             np.ascontiguousarray(plain(leaf), dtype=dtype) for leaf, dtype in zip(leaves, self._shared, strict=True)
@@ -55,7 +56,8 @@ class NativeProgram:
         order = alike([own[name] for name in self._names])
         values = [np.ascontiguousarray(own[name][order], dtype=self._dtype) for name in self._names]
         back = np.argsort(order)
-        return jax.tree.unflatten(self._tree, [one[back] for one in self._kernel.result()(shared, values, threads)])
+        found = self._kernel.result()(shared, values, threads, stop)
+        return jax.tree.unflatten(self._tree, [one[back] for one in found])
 
 
 def _done(translated: Translated, quickly: bool) -> Future[Kernel]:
@@ -84,7 +86,7 @@ def _kernel(translated: Translated, quickly: bool) -> Kernel:
     if code is None:
         code = compiled(translated, quickly)
         cache.save(key, code)
-    return Kernel(code, translated.lanes, translated.results, translated.scratch)
+    return Kernel(code, translated.lanes, translated.results, translated.scratch, translated.vectors)
 
 
 def alike(series: Sequence[np.ndarray]) -> np.ndarray:

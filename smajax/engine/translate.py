@@ -57,6 +57,7 @@ class Translated:
     lanes: int  # runs of a vector
     results: tuple[Array, ...]
     scratch: int  # bytes a thread needs
+    vectors: int = 1  # of a group
 
 
 def _numbers(known: Any) -> np.ndarray:
@@ -360,7 +361,7 @@ def translate(
     attributes = 'attributes #0 = { nounwind alignstack=64 "prefer-vector-width"="512" "min-legal-vector-width"="512" }'
     body, functions, room = laid_out(text.levels[0].items, text.names, text.uniform, lanes, vectors, text.scratch)
     lines = [*text.globals, *sorted(text.declared.values()), *functions, head, *body, "}", attributes]
-    return Translated("\n".join(lines) + "\n", lanes, results, text.scratch + room)
+    return Translated("\n".join(lines) + "\n", lanes, results, text.scratch + room, vectors)
 
 
 def _leave(text: Text, pointer: str, first: str, result: Array, value: Value) -> None:

@@ -9,12 +9,13 @@ import dataclasses
 
 from smajax.model.presets import build
 from smajax.model.system import System
-from smajax.model.wire.form import AbstractForm, IntegratedForm, RateForm
+from smajax.model.wire.form import AbstractForm, IntegratedForm
 
 
 def arm(law: str = "enhanced", form: AbstractForm | None = None) -> System:
-    """The rotary arm of section 3.1, with the rate form (eq. 3.2) of the constitutive law, as section 3.3 has it."""
-    return _formed(build("niti_table_3_1", "arm", "amplified_voltage", law), form or RateForm())
+    """The rotary arm of section 3.1, with the rate form (eq. 3.2) of the constitutive law, as section 3.3 has it, where neither `law` nor `form` says another."""
+    made = build("niti_table_3_1", "arm", "amplified_voltage", law)
+    return made if form is None else _formed(made, form)
 
 
 def dead_weight(law: str = "enhanced", form: AbstractForm | None = None) -> System:

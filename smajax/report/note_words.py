@@ -8,6 +8,7 @@ from smajax.control.run_notes import (
     MOST_SET_POINTS,
     AboveMelting,
     AboveStrength,
+    CycleLeavesStrain,
     EndsEarly,
     InputLeftOut,
     Note,
@@ -51,6 +52,11 @@ def _sentence(note: Note) -> str:
                 f"Not resolved: the run ({how}) differs from finer integrations by {digits(100.0 * share, 3)} % of a whole transformation (root mean "
                 f"square), more than the {digits(100.0 * limit, 3)} % that is aimed for. Try a smaller --tolerance, 1e-8, or a smaller --dt."
             ) + sensitive * loop
+        case CycleLeavesStrain(strain):
+            return (
+                f"The wire is martensite again at the temperature it began with, and {digits(100.0 * abs(strain), 2)} % of its length {'longer' if strain > 0.0 else 'shorter'}: "
+                "in rate form, the default, cycles do not close (docs/limits.md). They do under the law `integrated` (--law integrated)."
+            )
         case EndsEarly(asked, end, step):
             return (
                 f"The run ends at {digits(end, 4)} s of {digits(asked, 4)} s: it has whole steps of {digits(step, 4)} s (of a loop, control periods). "

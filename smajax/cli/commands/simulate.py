@@ -12,7 +12,7 @@ import typer
 from smajax.cli import completion
 from smajax.cli.loop_options import Delay, Estimator, Noise, Period, Quantum
 from smajax.cli.options import Finely, Json, Open, Overwrite, quantity, texts, tolerance_of
-from smajax.cli.plant_options import OtherPlant, loaded
+from smajax.cli.plant_options import LawName, OtherPlant, loaded
 from smajax.cli.terminal import browse, command_line, console, resumable
 
 if TYPE_CHECKING:
@@ -206,9 +206,7 @@ def simulate(
             autocompletion=completion.values,
         ),
     ] = None,
-    law: Annotated[
-        str, typer.Option(help="kinetics: tanaka, liang, brinson or enhanced", autocompletion=completion.laws)
-    ] = "",
+    law: LawName = "",
     seconds: Annotated[
         float | None, quantity("length of the run; default: that of the inputs", "s", above=0.0, like="10s")
     ] = None,

@@ -7,6 +7,7 @@ air's temperature is multiplied in degrees Celsius: 20 C becomes 10 to 40 C.
 from __future__ import annotations
 
 import dataclasses
+from contextlib import closing
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -106,9 +107,10 @@ def _run(function: Function, setup: LoopSetup, rows: np.ndarray, progress: Progr
     axes = zipped({**columns, NUMBER: np.arange(len(rows))})
     count = -(-len(rows) // CHUNK)
     results = []
-    for number, result in chunks(function, common, axes, min(CHUNK, len(rows)), range(count)):
-        results.append(result)
-        progress(Stage("sweeping", (number + 1) / count))
+    with closing(chunks(function, common, axes, min(CHUNK, len(rows)), range(count))) as coming:
+        for number, result in coming:
+            results.append(result)
+            progress(Stage("sweeping", (number + 1) / count))
     return jax.tree.map(lambda *leaves: np.concatenate(leaves), *results)
 
 

@@ -16,7 +16,10 @@ class ModelSection(Section):
     wire: str = Field(default="", description="the name of a wire, as text")
     load: str = Field(default="", description="the name of a load, as text")
     drive: str = Field(default="", description="the name of a drive, as text ('none' when nothing drives the wire)")
-    law: str = Field(default="", description="the name of a kinetics law, as text; left out, the wire's own")
+    law: str = Field(
+        default="",
+        description="the name of a law (`smajax presets`), as text; `integrated`: cycles close; left out, the wire's own",
+    )
     file: str | None = Field(default=None, description="the path of a model file, relative to this file, as text")
     parameters: dict[str, Quantity] = Field(default={}, description="a table of name = 'number unit'")
 

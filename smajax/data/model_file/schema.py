@@ -22,7 +22,10 @@ class PartsSection(Section):
     wire: str = Field(description="the name of a wire, as text")
     load: str = Field(description="the name of a load, as text")
     drive: str = Field(description="the name of a drive, as text ('none' when nothing drives the wire)")
-    law: str = Field(default="", description="the name of a kinetics law, as text; left out, the wire's own")
+    law: str = Field(
+        default="",
+        description="the name of a law (`smajax presets`), as text; `integrated`: cycles close; left out, the wire's own",
+    )
     effects: list[str] = Field(default=[], description="a list of effect names")
 
 

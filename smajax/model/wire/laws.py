@@ -1,4 +1,8 @@
-"""The authors' kinetics laws by name (Elahinia 2004, Table 3.3): each a choice of shape, conditions and variants."""
+"""The laws of a wire by name: the authors' kinetics (Elahinia 2004, Table 3.3), each a choice of shape, conditions and variants.
+
+`integrated` is `enhanced` with the integrated form of the constitutive law: every cycle closes. Under the others the wire keeps
+its form, that of the presets in rates.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +12,7 @@ from dataclasses import dataclass
 
 from smajax.core.names import close_matches
 from smajax.model.wire.conditions import AbstractConditions, Brinson, Enhanced, Liang
+from smajax.model.wire.form import AbstractForm, IntegratedForm
 from smajax.model.wire.shape import AbstractShape, Cosine, Exponential
 from smajax.model.wire.variants import AbstractVariants, Single, Split
 from smajax.model.wire.wire import Wire
@@ -21,12 +26,13 @@ def detwinning() -> Split:
 
 @dataclass(frozen=True)
 class Law:
-    """What makes a kinetics law that author's."""
+    """What makes a kinetics law that author's, and the form of the constitutive law where the name says it too."""
 
     shape: AbstractShape
     conditions: AbstractConditions
     variants: Callable[[], AbstractVariants]  # made when asked for: a parameter is an array of the caller's precision
     source: str
+    form: AbstractForm | None = None  # of the constitutive law; None: the wire's own
 
 
 LAWS: dict[str, Law] = {
@@ -34,6 +40,7 @@ LAWS: dict[str, Law] = {
     "liang": Law(Cosine(), Liang(), Single, "Liang and Rogers 1990; Elahinia 2004, eq. 2.8, 2.9, 3.11"),
     "brinson": Law(Cosine(), Brinson(), detwinning, "Brinson 1993; Elahinia 2004, eq. 2.14-2.17, 3.12"),
     "enhanced": Law(Cosine(), Enhanced(), Single, "Elahinia 2004, eq. 3.17, 3.18"),
+    "integrated": Law(Cosine(), Enhanced(), Single, "Elahinia 2004, eq. 3.17, 3.18, 4.51", IntegratedForm()),
 }
 
 
@@ -47,4 +54,5 @@ def under_law(wire: Wire, name: str) -> Wire:
         raise KeyError(f"No kinetics law `{name}`{close_matches(name, sorted(LAWS), 'there are')}.")
     law = LAWS[name]
     kinetics = dataclasses.replace(wire.kinetics, shape=law.shape, conditions=law.conditions, variants=law.variants())
-    return dataclasses.replace(wire, kinetics=kinetics)
+    form = wire.constitutive.form if law.form is None else law.form
+    return dataclasses.replace(wire, kinetics=kinetics, constitutive=dataclasses.replace(wire.constitutive, form=form))

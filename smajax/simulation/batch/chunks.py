@@ -5,7 +5,7 @@ By machine code a run's numbers are the same to the last bit whatever runs besid
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Generator, Hashable, Sequence
 from typing import Any
 
 import equinox as eqx
@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.core.operating_system import available_cores
-from smajax.engine import ON_CARD, Engine, block_size, cached, key_of, on_card, program, rounded
+from smajax.engine import ON_CARD, Coming, Engine, block_size, cached, key_of, on_card, program, rounded
 from smajax.simulation.batch.axes import Axes
 
 MOST = 1 << 15  # runs a chunk, however little is stored of each: what an interruption loses
@@ -65,22 +65,26 @@ def chunks(
     wanted: Sequence[int],
     devices: Sequence[jax.Device] | None = None,
     engine: Engine = "auto",
-) -> Iterator[tuple[int, Results]]:
+) -> Generator[tuple[int, Results], None, None]:
     """(number, results) of the chunks `wanted`, each of `size` runs but for the last, arrays of shape (runs, ...).
 
     While the caller writes one chunk the next is on its way. `devices` are those of XLA, and as many threads otherwise;
-    all that there are where they are not given. Raises Unsupported where `engine` is "native" and the function is not for it.
+    all that there are where they are not given. Closed before its end, it stops the next. Raises Unsupported where `engine` is "native" and the function is not for it.
     """
     several = tuple(devices or jax.local_devices())
     run = program(function, model, tuple(axes.names), engine=engine, devices=several)
     threads = len(several) if devices else available_cores()
     block = -(-size // len(several)) if on_card(several) else block_size(axes.size)
-    ahead: tuple[int, Callable[[], Results]] | None = None
-    for number in wanted:
-        start, stop = number * size, min((number + 1) * size, axes.size)
-        coming = run.begin(model, axes.runs(start, stop), threads, several, block, size)
-        if ahead is not None:
-            yield ahead[0], ahead[1]()
-        ahead = number, coming
-    if ahead is not None:
-        yield ahead[0], ahead[1]()
+    waiting: list[tuple[int, Coming]] = []
+    try:
+        for number in wanted:
+            start, stop = number * size, min((number + 1) * size, axes.size)
+            waiting.append((number, run.begin(model, axes.runs(start, stop), threads, several, block, size)))
+            if len(waiting) > 1:
+                yield waiting[0][0], waiting[0][1]()
+                del waiting[0]
+        for number, coming in waiting:
+            yield number, coming()
+    finally:  # Ctrl-C, or a caller that ends: without this the process would wait for results that nobody reads
+        for _, coming in waiting:
+            coming.stop()

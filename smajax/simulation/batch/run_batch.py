@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -97,9 +98,10 @@ def run_batch(  # the public form: what goes inwards is a `BatchSettings`
         return opened(Path(out))
     parts: list[dict[str, np.ndarray]] = []
     count = -(-axes.size // size)
-    for number, result in chunks(single_run, recipe, axes, size, range(count), devices, engine):
-        parts.append(_of_chunk(recipe, axes, size, number, result))
-        progress(Stage("simulating", (number + 1) / count))
+    with closing(chunks(single_run, recipe, axes, size, range(count), devices, engine)) as results:
+        for number, result in results:
+            parts.append(_of_chunk(recipe, axes, size, number, result))
+            progress(Stage("simulating", (number + 1) / count))
     whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     time = np.arange(recipe.steps // every + 1) * every * dt
     return labelled(whole, axes, recipe.units(), time, _attributes(recipe, how))
@@ -174,11 +176,10 @@ def fill(
     engine: Engine = "auto",
 ) -> None:
     """Compute the chunks `wanted` of a store."""
-    for done, (number, result) in enumerate(
-        chunks(single_run, recipe, store.axes, store.chunk, wanted, devices, engine), start=1
-    ):
-        store.write(number, _of_chunk(recipe, store.axes, store.chunk, number, result))
-        progress(Stage("simulating", done / len(wanted)))
+    with closing(chunks(single_run, recipe, store.axes, store.chunk, wanted, devices, engine)) as results:
+        for done, (number, result) in enumerate(results, start=1):
+            store.write(number, _of_chunk(recipe, store.axes, store.chunk, number, result))
+            progress(Stage("simulating", done / len(wanted)))
 
 
 def _of_chunk(
