@@ -41,13 +41,13 @@ class RunResult:
     system: System
     merit: Mapping[str, float]
     notes: tuple[Note, ...]
-    # Root mean square, rad or m, over `whole_run` and `second_half`, which the way to the reference leaves out; of a reference without figures of merit.
-    tracking_error: Mapping[str, float] = field(default_factory=dict)
     by_set_point: tuple[SetPointMerit, ...] = ()  # figures of merit by set point, where there are several
     mismatches: tuple[Mismatch, ...] = ()
     settings: tuple[Source, ...] = ()  # what a closed loop takes from files of gains and of models
     loop: LoopSettings | None = None  # of a closed loop: limit of the command, period, delay, filter, noise
     controller: AbstractController | None = None
+    # Root mean square, rad or m, over `whole_run` and `second_half`, which the way to the reference leaves out; of a reference without figures of merit.
+    tracking_error: Mapping[str, float] = field(default_factory=dict)
 
 
 def mismatches(assumed: System, plant: System) -> tuple[Mismatch, ...]:

@@ -290,21 +290,15 @@ def nothing_added() -> Findings:
         ({"explained_variance": 0.1}, "(explained variance 10% in runs left out)"),
         ({"superseded": ("radiation",)}, "radiation to the surroundings comes nearest, and one unknown function"),
         ({"rejected": (Rejected(("radiation",), 1e-3, 2e-3),)}, "Radiation to the surroundings would lower the error"),
+        (
+            {"rejected": (Rejected(("radiation",), 1e-3, 2e-3, True),)},
+            "How far these two differ may be chance, but more",
+        ),
         ({"outlier_runs": (OutlierRun("step 6 V", (), True, 1e-3, 2e-5, 3e-3),)}, "in one run alone: without step 6 V"),
     ],
 )
 def test_a_verdict_without_a_named_effect_gives_the_reason(changed: dict[str, Any], said: str) -> None:
     assert said in narrate(dataclasses.replace(nothing_added(), **changed)).summary[0]
-
-
-def test_a_rejection_that_may_be_chance_says_so() -> None:
-    def said(rejected: Rejected) -> str:
-        return narrate(dataclasses.replace(nothing_added(), rejected=(rejected,))).summary[0]
-
-    certain = Rejected(("radiation",), 1e-3, 2e-3)
-    assert "may be chance" not in said(certain)
-    chance = said(dataclasses.replace(certain, may_be_chance=True))
-    assert "How far these two differ may be chance, but more than noise is left of the fit runs as well." in chance
 
 
 def test_an_outlier_run_beside_an_added_effect_is_reported() -> None:
