@@ -28,6 +28,7 @@ EFFECTS: dict[str, Effect] = {
     # heat
     "latent_heat": Effect("heat", 3e3, 4e4, "J/kg"),
     "rising_convection": Effect("heat", 1e-3, 3e-2, "1/K of the convection above ambient"),
+    "free_convection": Effect("heat", 0.02, 0.5, "exponent of the temperature above ambient, over 50 K"),
     "radiation": Effect("heat", 0.1, 1.0, "emissivity"),
     "ambient_drift": Effect("heat", 0.01, 0.3, "K/s"),
     "draught": Effect("heat", 0.01, 1.0, "share added to the convection between 0.35 and 0.6 of a run"),

@@ -10,6 +10,10 @@ STEFAN_BOLTZMANN = 5.670374419e-8
 ZERO_CELSIUS = 273.15
 DRAUGHT_AT = (0.35, 0.6)  # share of a run between which the draught blows
 REGIME_AT = 45.0  # K above ambient at which the flow around the wire changes
+POWER_AT, POWER_FROM = (
+    50.0,
+    1.0,
+)  # K above ambient at which a power law's convection is the constant one; from which on it is one
 CLAMP_TIME = 12.0  # s
 SAG_TIME = 4.0  # s
 PWM_SUPPLY = 2.0  # supply's volts over the largest command of all runs
@@ -23,6 +27,7 @@ class Heat:
         self.ambient, self.drift = wire.ambient_temperature, get("ambient_drift", 0.0)
         self.convection = wire.convection_coefficient * wire.surface
         self.rising = get("rising_convection", 0.0)
+        self.exponent = get("free_convection", 0.0)
         self.radiation = get("radiation", 0.0) * STEFAN_BOLTZMANN * wire.surface
         self.draught = get("draught", 0.0)
         self.blows = DRAUGHT_AT[0] * seconds, DRAUGHT_AT[1] * seconds
@@ -38,6 +43,8 @@ class Heat:
         ambient = self.ambient + self.drift * t
         excess = temperature - ambient
         convection = self.convection * (1 + self.rising * excess)
+        if self.exponent:
+            convection *= (math.hypot(excess, POWER_FROM) / POWER_AT) ** self.exponent
         if self.draught and self.blows[0] <= t < self.blows[1]:
             convection *= 1 + self.draught
         if self.regime and excess > REGIME_AT:

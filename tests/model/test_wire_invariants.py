@@ -17,6 +17,7 @@ from smajax.model.presets import build
 from smajax.model.wire.constitutive import young_modulus
 from smajax.model.wire.kinetics import martensite_left
 from smajax.model.wire.kinetics_terms import NO_TERMS
+from smajax.model.wire.order import ORDER
 from smajax.simulation.compiled import simulate_compiled
 
 RIGS = {
@@ -34,7 +35,7 @@ def _inputs(channel: str, top: float, levels: list[float]) -> dict[str, jax.Arra
 
 
 def _spread(system: eqx.Module, shares: list[float]) -> eqx.Module:
-    """Every parameter moved by up to half of itself, within its declared bounds."""
+    """Every parameter moved by up to half of itself, within its declared bounds; those in the wrong order, which no run takes, exchanged."""
     table = parameters(system)
     names = list(table)
     moved = {}
@@ -42,6 +43,10 @@ def _spread(system: eqx.Module, shares: list[float]) -> eqx.Module:
         value = float(get_parameters(system, [name])[0])
         share = shares[index % len(shares)]
         moved[name] = float(np.clip(value * (0.5 + share), table[name].low, table[name].high))
+    for lower, higher, _ in ORDER:
+        if lower in moved and higher in moved:
+            low, high = sorted((moved[lower], moved[higher]))
+            moved[lower], moved[higher] = min(low, high - 1e-3), high
     return set_parameters(system, moved)
 
 
