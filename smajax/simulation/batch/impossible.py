@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from smajax.core.parameters import parameters
+from smajax.core.parameters import Parameter, parameters
 from smajax.model.system import System
 from smajax.model.wire.order import ORDER, pairs
 from smajax.simulation.batch.axes import Axes, Dimension
@@ -16,13 +16,18 @@ from smajax.simulation.observers import IMPOSSIBLE
 RUN_ALL_THE_SAME = f"such runs are simulated all the same, and what comes of them means nothing: `status` {IMPOSSIBLE} marks them, and `good` leaves them out."
 
 
+def _beyond(entry: Parameter, values: np.ndarray) -> np.ndarray:
+    """Which values are out of the parameter's bounds; what is no number is."""
+    return ~((values >= entry.low) & (values <= entry.high))
+
+
 def impossible(system: System, values: Mapping[str, np.ndarray]) -> np.ndarray:
     """Which runs have a parameter out of its bounds, or two in the wrong order; shape (runs,), of values of this shape."""
     table = parameters(system)
     found = np.zeros(np.shape(next(iter(values.values()))), dtype=bool)
     for name, series in values.items():
         if name in table:
-            found |= ~((series >= table[name].low) & (series <= table[name].high))
+            found |= _beyond(table[name], series)
     for one in pairs(system, values):
         found |= one.wrong
     return found
@@ -56,11 +61,11 @@ def warn_of_impossible(system: System, axes: Axes) -> None:
         for name, values in dimension.values.items():
             if name not in table:
                 continue
-            low, high = table[name].low, table[name].high
-            beyond = values[~((values >= low) & (values <= high))]
+            entry = table[name]
+            beyond = values[_beyond(entry, values)]
             if beyond.size:
                 warnings.warn(
-                    f"{beyond.size} of {values.size} values of `{name}` are out of its bounds, {low:g} to {high:g} {table[name].unit}, "
+                    f"{beyond.size} of {values.size} values of `{name}` are out of its bounds, {entry.low:g} to {entry.high:g} {entry.unit}, "
                     f"such as {beyond[0]:g}: {RUN_ALL_THE_SAME}",
                     stacklevel=4,
                 )
