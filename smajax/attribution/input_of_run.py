@@ -13,11 +13,11 @@ likelier than none by more than twenty to one, and the effects found beside it w
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from smajax.attribution.explained_share import EXPLAINED, explained_share
 from smajax.attribution.findings import ParameterFinding
 from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model, independent_error
@@ -45,7 +45,6 @@ FAR_LESS = 4.0  # times that what the present model leaves before a search has e
 ON_TRIAL = (
     4.0  # times less than the base model that values of one run, or of two, leave of all runs, to be corrected on trial
 )
-SHARE_LEFT = 0.5  # of the squares beyond noise that the model found leaves: with an error of a record that much may be left when a search has ended
 AT_NOISE = 1.1  # noises: what leaves no more leaves noise
 LEAST_RUNS = 3  # of two runs that disagree either may be the wrong one
 
@@ -115,14 +114,16 @@ class _Compared:
 
     def explaining(self, fits: Sequence[Fit]) -> list[Fit]:
         """Those that leave next to noise, and are likelier than the present model."""
-        most = MOST_LEFT * self.noise
+        return [fit for fit in fits if self._explains(fit.model.rms) and self.ahead(fit) >= LEAST_ODDS]
+
+    def _explains(self, left: float) -> bool:
+        """Whether so much (root mean square, SI) is next to noise, and most of what the present model leaves is gone."""
+        if left > MOST_LEFT * self.noise:
+            return False
         if self.times_less is not None:
-            most = min(most, self.present.rms / self.times_less)
-        else:
-            # Of what the present model leaves beyond noise most: a small error of any record takes a little of what all else is missing.
-            beyond = max(self.present.rms**2 - self.noise**2, 0.0)
-            most = min(most, max(AT_NOISE * self.noise, math.sqrt(self.noise**2 + SHARE_LEFT * beyond)))
-        return [fit for fit in fits if fit.model.rms <= most and self.ahead(fit) >= LEAST_ODDS]
+            return left <= self.present.rms / self.times_less
+        # A small error of any record takes a little of what all else is missing.
+        return left <= AT_NOISE * self.noise or explained_share(left, self.present.rms, self.noise) >= EXPLAINED
 
     def on_trial(self, fits: Sequence[Fit]) -> list[Fit]:
         """Those that take most of what the base model leaves and leave more than noise, and are likelier than the present model."""

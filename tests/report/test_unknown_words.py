@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
+from smajax.attribution.explained_share import EXPLAINED, explained_share
 from smajax.attribution.findings import UnknownTerm
-from smajax.attribution.unknown.explained_share import EXPLAINED, explained_share
 from smajax.attribution.unknown.terms import UNKNOWN
 from smajax.report.narrative import narrate
 from tests.report.test_narrative import nothing_added

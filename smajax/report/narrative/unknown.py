@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import cast
 
+from smajax.attribution.explained_share import EXPLAINED, explained_share
 from smajax.attribution.findings import Findings, UnknownTerm
-from smajax.attribution.unknown.explained_share import EXPLAINED, explained_share
 from smajax.core.display_units import label
 from smajax.core.wording import per_cent
 from smajax.report.narrative.values import error_text
