@@ -114,6 +114,8 @@ class Actuator:
         e = w.young_modulus_austenite + xi * (w.young_modulus_martensite - w.young_modulus_austenite)
         sign = 0 if b is None else b.sign
         eps, alpha, delta = self.strains.per_fraction(xi, stress, sign), self.strains.expansion, 0.0
+        if self.strains.mismatch:
+            eps += self.strains.softening(xi, stress, temperature)
         if "creep" in at:
             delta = out[at["creep"]] = self.strains.creep_rate(s[at["creep"]], stress, xi)
         power, current = self.electricity.power(self.command, temperature, xi, s[at["sag"]] if "sag" in at else 0.0)

@@ -1,6 +1,6 @@
 """The cases: which rig, which effects, how strong, which seed. All else follows from a case's name.
 
-Nulls lack nothing; singles hold one effect of `effects.EFFECTS`, pairs two, foreign ones one that is in no library.
+Nulls lack nothing; singles hold one effect of `effects.EFFECTS`, pairs two, triples three, foreign ones one that is in no library.
 """
 
 from __future__ import annotations
@@ -45,6 +45,16 @@ COUPON_PAIRS = (
 )
 
 
+# What a bench of somebody else may differ by: three effects of three equations.
+TRIPLES = (
+    ("free_convection", "coulomb_friction", "elastic_mismatch"),
+    ("latent_heat", "asymmetric_transformation", "sensor_lag"),
+    ("radiation", "minor_loops", "series_compliance"),
+    ("temperature_resistance", "stress_dependent_width", "creep"),
+)
+COUPON_TRIPLES = (("asymmetric_transformation", "elastic_mismatch", "creep"),)
+
+
 @dataclass(frozen=True)
 class Case:
     """One case; `strength` 0: a null, or effects that a refit takes up."""
@@ -62,12 +72,12 @@ class Case:
 
     @property
     def kind(self) -> str:
-        """null, absorbed, single, pair or outside."""
+        """null, absorbed, single, pair, triple or outside."""
         if self.effects and not self.strength:
             return "absorbed"
         if any(EFFECTS[name].outside for name in self.effects):
             return "outside"
-        return ("null", "single", "pair")[len(self.effects)]
+        return ("null", "single", "pair", "triple")[len(self.effects)]
 
     @property
     def fresh(self) -> bool:
@@ -111,6 +121,10 @@ def cases(drawn: int = 0) -> list[Case]:
                 continue
             found.append(Case(rig, pair, STRENGTHS[1], 0))
             found.append(Case(rig, pair, STRENGTHS[2], 1))
+    for rig in RIGS:
+        for triple in COUPON_TRIPLES if rig == "coupon" else TRIPLES:
+            if all(applies(name, rig) for name in triple):
+                found += [Case(rig, triple, strength, i) for i, strength in enumerate(STRENGTHS[1:])]
     return [replace(case, number=case.number + ANEW * drawn) for case in found]
 
 
@@ -146,5 +160,5 @@ def truth(case: Case) -> Truth:
     found = {name: ruler.find(name, case.strength) for name in case.effects}
     effects = {name: f.coefficient for name, f in found.items()}
     alone = len(found) == 1
-    together = next(iter(found.values())).strength if alone else ruler.strength(effects)
+    together = next(iter(found.values())).strength if alone else ruler.together(effects)
     return Truth(case.rig, wire, effects, found, together)

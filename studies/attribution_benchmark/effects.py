@@ -56,7 +56,9 @@ EFFECTS: dict[str, Effect] = {
     "stress_dependent_strain": Effect("constitutive", 2e-3, 6e-2, "largest strain added, 100 MPa"),
     "residual_strain": Effect("constitutive", 2e-4, 1e-2, "strain left per transformation passed"),
     "creep": Effect("constitutive", 5e-4, 2e-2, "strain of martensite under 100 MPa, behind 8 s"),
-    "elastic_mismatch": Effect("constitutive", 0.1, 1.2, "of the change of sigma/E with the phase", ("coupon",)),
+    "elastic_mismatch": Effect(
+        "constitutive", 0.1, 1.2, "of the change of sigma/E with the phase", ("arm", "bias_spring", "coupon")
+    ),
     # mechanics
     "coulomb_friction": Effect("mechanics", 0.02, 0.5, "of the load at rest"),
     "stribeck_friction": Effect(

@@ -46,7 +46,7 @@ class Judged:
     """One case beside its truth. Errors are rms over the noise."""
 
     case: str
-    kind: str  # null, absorbed, single, pair, outside
+    kind: str  # null, absorbed, single, pair, triple, outside
     rig: str
     asked: float  # noises that the effect leaves after a refit of the base model
     strength: float  # what it came to: a physical limit may lie below
@@ -61,6 +61,11 @@ class Judged:
     held_out_before: float
     held_out_after: float
     seconds: float
+
+    @property
+    def several(self) -> bool:
+        """Whether more than one effect of the library is there."""
+        return self.kind in ("pair", "triple")
 
     @property
     def effect_right(self) -> bool:

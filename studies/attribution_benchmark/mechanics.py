@@ -76,6 +76,13 @@ class Strains:
         elastic = stress - wire.thermal_modulus * (temperature - wire.ambient_temperature)
         return self.mismatch * elastic * (1.0 / after - 1.0 / before)
 
+    def softening(self, xi: float, stress: float, temperature: float) -> float:
+        """The rate of `softened` by the fraction."""
+        wire = self.wire
+        hot, cold = wire.young_modulus_austenite, wire.young_modulus_martensite
+        elastic = stress - wire.thermal_modulus * (temperature - wire.ambient_temperature)
+        return self.mismatch * elastic * (hot - cold) / (hot + xi * (cold - hot)) ** 2
+
     def per_fraction(self, xi: float, stress: float, sign: int) -> float:
         """Strain per unit of martensite fraction; `sign` of the active branch, +1 heating."""
         strain = self.base

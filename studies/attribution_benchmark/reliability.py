@@ -2,7 +2,7 @@
 
     python -m studies.attribution_benchmark.reliability OUT [OUT ...] [--to FOLDER]
 
-`OUT` are folders that `run` has written. Counted are the effects of nulls, singles and pairs that were in a set of effects worth a fit; names of one true effect
+`OUT` are folders that `run` has written. Counted are the effects of nulls, singles, pairs and triples that were in a set of effects worth a fit; names of one true effect
 (`judge.called`) exclude each other and count once, with the sum of their probabilities. True effects that were in no such set are counted by themselves.
 Intervals take the effects for independent; those of one case compete, so they are somewhat wider in truth.
 """
@@ -58,7 +58,7 @@ def read(folders: Sequence[Path]) -> list[Given]:
     for folder in folders:
         for path in sorted((folder / "judged").glob("*.json")):
             one = load(path)
-            if one.kind in ("null", "single", "pair"):
+            if one.kind in ("null", "single", "pair", "triple"):
                 report = json.loads((folder / "reports" / path.name).read_text(encoding="utf-8"))
                 result.extend(given(one, report))
     return result

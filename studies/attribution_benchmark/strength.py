@@ -29,6 +29,8 @@ ENOUGH = 0.95  # a step that leaves more of the rest than this share is the last
 CLOSER = 0.7  # in logarithms, towards what can be simulated
 DEGREES = 0.1  # steps of the derivatives: of a temperature, K
 SHARE = 2e-3  # of all else
+# Of a simulation: ranges meet or vanish, or the modes chatter.
+NO_SUCH_WIRE = (ValueError, RuntimeError, ZeroDivisionError)
 
 
 @dataclass(frozen=True)
@@ -80,12 +82,21 @@ class Ruler:
             columns.append(zero)
         return columns
 
-    def strength(self, effects: Effects) -> float:
-        """Root mean square of what a refit leaves of the effects, in noises."""
+    def together(self, effects: Effects) -> float:
+        """`strength` of several effects, by fewer steps of the refit where these end at wires that do not exist."""
+        for refits in range(REFITS, 0, -1):
+            try:
+                return self.strength(effects, refits)
+            except NO_SUCH_WIRE:
+                continue
+        return self.strength(effects, 0)
+
+    def strength(self, effects: Effects, refits: int = REFITS) -> float:
+        """Root mean square of what a refit by so many steps leaves of the effects, in noises."""
         shown = self.readings(self.wire, effects)
         wire, rest = self.wire, shown - self.null
         left = self._without_zeros(rest)
-        for _ in range(REFITS):
+        for _ in range(refits):
             off = [(getattr(self.wire, name) - getattr(wire, name)) / one for name, one in self.spread.items()]
             move = np.linalg.solve(self.corner, self.basis.T @ np.concatenate([rest, off])) / self.sizes
             moved = {name: getattr(wire, name) + float(d) for name, d in zip(self.names, move, strict=False)}
@@ -118,11 +129,7 @@ class Ruler:
         for _ in range(TRIALS):
             try:
                 trials.append((size, miss(size)))
-            except (
-                ValueError,
-                RuntimeError,
-                ZeroDivisionError,
-            ):  # no such wire: ranges meet or vanish, or the modes chatter
+            except NO_SUCH_WIRE:
                 largest = size - CLOSER
                 size = largest
                 continue

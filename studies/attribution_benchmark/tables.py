@@ -29,7 +29,7 @@ def strength_of(one: Judged) -> float:
     The generator's few steps bound it from above: where the loop's own refit of the base model, which goes to its end,
     leaves less, that is what there was to see.
     """
-    if one.kind == "pair" or not np.isfinite(one.fit_before):
+    if one.several or not np.isfinite(one.fit_before):
         reached = one.strength
     else:
         reached = min(one.strength, float(np.sqrt(max(one.fit_before**2 - 1.0, 0.0))))
@@ -41,6 +41,7 @@ def bars(cases: Sequence[Judged]) -> list[tuple[str, str, str]]:
     nulls = [one for one in cases if one.kind == "null"]
     strong = [one for one in cases if one.kind == "single" and strength_of(one) == 10.0]
     pairs = [one for one in cases if one.kind == "pair"]
+    triples = [one for one in cases if one.kind == "triple"]
     outside = [one for one in cases if one.kind == "outside" and strength_of(one) == 10.0]
     asked = [one for one in cases if one.kind == "single" and one.asked == 10.0 and one.strength >= REACHED * 10.0]
     return [
@@ -62,8 +63,14 @@ def bars(cases: Sequence[Judged]) -> list[tuple[str, str, str]]:
             share(asked, lambda one: one.equation_right),
         ),
         ("the same of all that were written with 10 noises: effect", "–", share(asked, lambda one: one.effect_right)),
-        ("of all effects that were added to singles and pairs, those that are there", "–", precision(cases)),
+        ("of all effects that were added to singles, pairs and triples, those that are there", "–", precision(cases)),
         ("both effects of a pair", "70 %", share(pairs, lambda one: one.effect_right)),
+        ("all three effects of a triple", "–", share(triples, lambda one: one.effect_right)),
+        (
+            "held-out error of a triple at most 1.5 times the noise",
+            "–",
+            share(triples, lambda one: one.held_out_after <= 1.5),
+        ),
         (
             "outside the library, 10 times: said so, or the right equation",
             "80 %",
@@ -86,7 +93,7 @@ def most_alarms(nulls: Sequence[Judged]) -> float:
 
 def precision(cases: Sequence[Judged]) -> str:
     """Of what was added, how much is true: "31 of 36 (86 %)"."""
-    added = [(one, name) for one in cases if one.kind in ("single", "pair") for name in one.added]
+    added = [(one, name) for one in cases if one.kind == "single" or one.several for name in one.added]
     true = [name for one, name in added if any(name in called(effect) for effect in one.truth)]
     return f"{len(true)} of {len(added)} ({100.0 * len(true) / len(added):.0f} %)" if added else "nothing added"
 
@@ -97,7 +104,7 @@ def confusion(cases: Sequence[Judged]) -> tuple[list[str], list[str], np.ndarray
     columns = [*EQUATIONS, OUTSIDE, NOTHING]
     counts = np.zeros((len(rows), len(columns)), int)
     for one in cases:
-        if one.kind == "pair":
+        if one.several:
             continue
         counts[rows.index(one.equations[0] if one.equations else NOTHING), columns.index(one.told)] += 1
     return rows, columns, counts
@@ -122,9 +129,7 @@ def power(cases: Sequence[Judged]) -> list[tuple[str, str, str, str, str]]:
 
 def missed(cases: Sequence[Judged]) -> list[Judged]:
     """Cases behind a bar that was missed: nulls with an alarm, strong effects that were not named."""
-    return [
-        one for one in cases if not one.right and (one.kind == "null" or strength_of(one) == 10.0 or one.kind == "pair")
-    ]
+    return [one for one in cases if not one.right and (one.kind == "null" or strength_of(one) == 10.0 or one.several)]
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -84,6 +84,23 @@ def test_the_base_is_the_reference() -> None:
     assert np.abs(here[-1] - reference["martensite_fraction"]).max() < 1e-5
 
 
+@pytest.mark.parametrize("name", ["arm", "dead_weight"])
+def test_with_the_whole_mismatch_the_strain_depends_on_the_state_alone(name: str) -> None:
+    """Eq. 4.51: (sigma - theta_T (T - T_inf))/E(xi) + eps_L xi, less its value at the start; the rate form has a way of its own."""
+    rig, run = _short(name)
+    w, load = rig.wire, actuator_of(rig, rig.wire, run, {}).load
+    off = []
+    for share in (1.0, 0.0):
+        temperature, stress, position, xi = simulate(rig, w, run, {"elastic_mismatch": share})[[0, 1, 2, -1]]
+        strain = -load.ratio * (position - position[0]) / w.wire_length
+        modulus = w.young_modulus_austenite + xi * (w.young_modulus_martensite - w.young_modulus_austenite)
+        elastic = (stress - w.thermal_modulus * (temperature - w.ambient_temperature)) / modulus
+        state = elastic + w.recoverable_strain * xi
+        assert np.ptp(xi) > 0.5
+        off.append(float(np.abs(strain - (state - state[0])).max() / np.ptp(strain)))
+    assert off[0] < 1e-5 < 1e-3 < off[1]
+
+
 def test_effects_of_zero_are_none() -> None:
     for name in ("dead_weight", "coupon"):
         rig, run = _short("dead_weight") if name == "dead_weight" else (RIGS[name], RIGS[name].runs(RIGS[name].wire)[0])
@@ -178,6 +195,7 @@ def test_enough_cases_of_each_kind() -> None:
     kinds = Counter(case.kind for case in every)
     assert kinds["null"] >= 100
     assert kinds["pair"] >= 30
+    assert kinds["triple"] >= 20
     assert kinds["outside"] >= 20
     assert kinds["absorbed"] >= 10
     foreign = {EFFECTS[name].group for name in EFFECTS if EFFECTS[name].outside}
