@@ -146,6 +146,14 @@ def test_samples_far_off_do_not_move_a_robust_fit(tmp_path: Path) -> None:
     assert any("Huber" in sentence for sentence in conclusions(plain))
 
 
+def test_another_loss_is_not_advised_where_the_model_lacks_something(found: Identified) -> None:
+    skewed = dataclasses.replace(found, whiteness_p=1e-9, normality_p=1e-9)
+    for ratio, advised in ((1.2, True), (30.0, False)):
+        output = dataclasses.replace(found.outputs[0], ratio=ratio)
+        said = conclusions(dataclasses.replace(skewed, outputs=(output,)))
+        assert any("Huber" in sentence for sentence in said) == advised
+
+
 def test_huber_weights_fall_as_one_over_the_distance() -> None:
     misfit, mask = np.concatenate([np.linspace(-1.0, 1.0, 201), [50.0, 9.0]])[None], np.ones((1, 203))
     mask[0, -1] = 0.0
