@@ -44,7 +44,7 @@ class JointSearch:
     has_wrong_record: Callable[[FittedModel], bool] = lambda _: False
     wrong_record: FoundRecordErrors | None = None
     free_beside: tuple[str, ...] | None = (
-        None  # effects beside which free values of presets leave next to noise, if that ended the search
+        None  # effects beside which free values of presets take most of what is left, if that ended the search
     )
     lacking: AskedFor | None = None  # unknown terms beside the base model, where they were asked for
 

@@ -125,9 +125,13 @@ class _Compared:
         # A small error of any record takes a little of what all else is missing.
         return left <= AT_NOISE * self.noise or explained_share(left, self.present.rms, self.noise) >= EXPLAINED
 
+    def _leaves_more(self, left: float) -> bool:
+        """Whether so much (root mean square, SI) is more than noise, or at the end of a search too little less than the present model leaves."""
+        return left > MOST_LEFT * self.noise or (self.times_less is None and not self._explains(left))
+
     def on_trial(self, fits: Sequence[Fit]) -> list[Fit]:
         """Those that take most of what the base model leaves and leave more than noise, and are likelier than the present model."""
-        beside_none = [fit for fit in fits if not fit.host.effects and fit.model.rms > MOST_LEFT * self.noise]
+        beside_none = [fit for fit in fits if not fit.host.effects and self._leaves_more(fit.model.rms)]
         return [fit for fit in beside_none if fit.model.rms <= fit.before / ON_TRIAL and self.ahead(fit) >= LEAST_ODDS]
 
 

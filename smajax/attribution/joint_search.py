@@ -13,7 +13,7 @@ only strong effects are added; the better the model, the finer the effects that 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -210,25 +210,31 @@ def _neighbours(search: JointSearch, linear: LinearModel, present: FittedModel, 
     here: Subset = frozenset(Variant(effect, -1) for effect in present.effects)
     others = [one for one in linear.places if one.effect not in present.effects]
 
-    def likeliest(rest: Subset) -> list[Subset]:
-        return sorted((rest | {one} for one in others), key=lambda one: -linear.log_evidence(one))
+    def likeliest(sets: Iterable[Subset]) -> list[Subset]:
+        return _once(search, sorted(sets, key=lambda one: -linear.log_evidence(one)))
+
+    def with_one(rest: Subset) -> list[Subset]:
+        return likeliest(rest | {one} for one in others)
 
     near: list[Subset] = []
     for gone in here:
-        near += [here - {gone}, *likeliest(here - {gone})[:REPLACED]]
-    near = [one for one in near if linear.log_evidence(one) > linear.log_evidence(here) - CERTAIN]
-    near = sorted(near, key=lambda one: -linear.log_evidence(one))[:NEIGHBOURS]
-    alike = [here - {gone} | {one} for gone in here for one in others if replaceable(gone.effect, one.effect)]
-    alike.sort(key=linear.log_evidence)  # of several places of an effect the last one counts
-    near = list({_effects(search, one): one for one in (*near, *alike)}.values())
+        near += [here - {gone}, *with_one(here - {gone})[:REPLACED]]
+    near = likeliest(one for one in near if linear.log_evidence(one) > linear.log_evidence(here) - CERTAIN)
+    alike = likeliest(here - {gone} | {one} for gone in here for one in others if replaceable(gone.effect, one.effect))
+    near = _once(search, [*near[:NEIGHBOURS], *alike])
     near = [one for one in near if _fresh(search, _effects(search, one), error)]
     if error < UNEXPLAINED * search.noise or len(present.effects) >= MANY:
         return near
-    beside: dict[tuple[str, ...], Subset] = {}
-    for one in likeliest(here):
-        if np.isfinite(linear.log_evidence(one)) and _effects(search, one) not in search.fitted:
-            beside.setdefault(_effects(search, one), one)
-    return [*near, *list(beside.values())[:NEIGHBOURS]]
+    beside = [one for one in with_one(here) if np.isfinite(linear.log_evidence(one))]
+    return [*near, *[one for one in beside if _effects(search, one) not in search.fitted][:NEIGHBOURS]]
+
+
+def _once(search: JointSearch, sets: Iterable[Subset]) -> list[Subset]:
+    """The first one of each set of effects: of several places of an effect one is fitted."""
+    first: dict[tuple[str, ...], Subset] = {}
+    for one in sets:
+        first.setdefault(_effects(search, one), one)
+    return list(first.values())
 
 
 def _several_at_once(
@@ -246,11 +252,12 @@ def _several_at_once(
     level = float(np.sqrt(error * search.noise))
     traces = traces_there()
     linear = _climbed(search, present, traces, level)
-    sets: dict[tuple[str, ...], Subset] = {}
-    for subset in linear.ranked()[:REACHED]:
-        effects = _effects(search, subset)
-        if effects not in search.fitted and linear.rms(subset) < LEAVES_IN_LINEAR * search.noise:
-            sets.setdefault(effects, subset)
+    reached = {_effects(search, one): one for one in _once(search, linear.ranked())[:REACHED]}
+    sets = {
+        effects: one
+        for effects, one in reached.items()
+        if effects not in search.fitted and linear.rms(one) < LEAVES_IN_LINEAR * search.noise
+    }
     if not sets:
         return None
     begun = _begun(search, list(sets.values())[:AT_ONCE], linear, traces, level)

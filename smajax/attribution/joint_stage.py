@@ -117,7 +117,10 @@ class _Stage:
         held.programs = free.programs
         found = search_jointly(held, {(): base})
         if held.free_beside is not None:
-            return self.resumed(held, held.fitted[held.free_beside], most=1)
+            freed, instead = self.resumed(held, held.fitted[held.free_beside], most=1)
+            if instead.rms < found.rms or freed.wrong_record:
+                return freed, instead
+            held.programs = freed.programs  # one step had promised more than a fit came to
         return (held, found) if held.wrong_record else self.resumed(held, found)
 
     def in_place_of_many(self, search: JointSearch, found: FittedModel) -> FittedModel | None:
@@ -148,8 +151,10 @@ class _Stage:
         models = [search.fitted[()], *likeliest, found]
         left = [self._without_runs(search, one) for one in models]
         better = [any(one.stands_out for one in its_left) for its_left in left]
+        # That of the base model with values of presets free was fitted before.
+        by_a_step = None if search.thorough else _freed_by_a_step(models[1:], left[1:], found)
         if not any(better):
-            search.free_beside = None if search.thorough else _freed_by_a_step(models, left, found)
+            search.free_beside = by_a_step
             return search.free_beside is not None
         # What many effects stand in for may be one of the few beside the record.
         hosts = [one for one, much in zip(models, better, strict=True) if much or one in likeliest]
@@ -158,8 +163,10 @@ class _Stage:
         if wrong is not None and not wrong.errors:
             search.free_beside = None if search.thorough else search.joint.ordered(wrong.beside)
             return search.free_beside is not None
+        if wrong is None:
+            search.free_beside = by_a_step
         search.wrong_record = wrong
-        return wrong is not None
+        return wrong is not None or search.free_beside is not None
 
     def _without_runs(self, search: JointSearch, model: FittedModel) -> tuple[Left, ...]:
         """What is left of the others without one run, and without two."""

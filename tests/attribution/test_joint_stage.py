@@ -160,22 +160,22 @@ def _left(stands_out: bool, of_all: float = 5.0) -> tuple[Any, ...]:
     ("of_all", "beside"),
     [
         ((2.0, 1.4, 1.0), THREE[:1]),  # the fewest effects of which values of presets take as much as of any
-        ((1.2, 1.4, 1.0), ()),
+        ((1.0, 4.0, 3.0), None),  # of the base model a fit with these free has said less
         ((4.0, 3.0, 2.6), None),  # of 5.0, half and more
     ],
 )
+@pytest.mark.parametrize("stands_out", [False, True])
 def test_a_search_with_values_of_presets_held_ends_where_a_step_of_these_takes_most(
-    monkeypatch: pytest.MonkeyPatch, of_all: tuple[float, ...], beside: tuple[str, ...] | None
+    monkeypatch: pytest.MonkeyPatch, of_all: tuple[float, ...], beside: tuple[str, ...] | None, stands_out: bool
 ) -> None:
-    """Without any run as well as with all of them: so no record is looked for."""
+    """Without any run as well as with all of them: so no record is looked for; or without one, whose record is right."""
     stage, search, _ = _stage_and_search(monkeypatch, [], [])
-    stage.setting.wrong_record = lambda *_: pytest.fail("a record was asked for")
+    stage.setting.wrong_record = lambda *_: None if stands_out else pytest.fail("a record was asked for")
     left = [*of_all, *of_all]
-    monkeypatch.setattr(joint_stage._Stage, "_without_runs", lambda *_: _left(False, left.pop(0)))
+    monkeypatch.setattr(joint_stage._Stage, "_without_runs", lambda *_: _left(stands_out, left.pop(0)))
     search.free_beside, search.thorough = None, False
     search.fitted |= {(): _model((), 9.0, 0.0), THREE[:1]: _model(THREE[:1], 5.0, 3.0)}
-    many = cast(Any, _model(THREE, 5.0, 9.0))
-    many.rms = 5.0
+    many = _model(THREE, 5.0, 9.0)
     assert stage.has_wrong_record(search, many) is (beside is not None)
     assert search.free_beside == beside
     search.thorough, search.free_beside = True, None  # they are free already
@@ -191,7 +191,7 @@ def test_a_search_with_values_of_presets_held_ends_where_these_alone_were_missin
     monkeypatch.setattr(joint_stage._Stage, "_without_runs", lambda *_: _left(True))
     search.joint.ordered, search.free_beside = tuple, None
     search.fitted |= {THREE[:1]: _model(THREE[:1], 5.0, 3.0)}
-    many = cast(Any, _model(THREE, 5.0, 9.0))
+    many = _model(THREE, 5.0, 9.0)
     search.thorough = False
     assert stage.has_wrong_record(search, many)
     assert (search.free_beside, search.wrong_record) == (THREE[:1], None)
@@ -199,9 +199,11 @@ def test_a_search_with_values_of_presets_held_ends_where_these_alone_were_missin
     assert not stage.has_wrong_record(search, many)
 
 
+@pytest.mark.parametrize("left", [1.0, 6.0])
 def test_values_of_presets_are_free_from_the_effects_on_beside_which_they_alone_were_missing(
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch: pytest.MonkeyPatch, left: float
 ) -> None:
+    """And the search goes on from the many effects after all where a fit leaves more than these do."""
     stage, search, _ = _stage_and_search(monkeypatch, [], [])
     stage.setting.presets = {"damping": None}
     search.fitted |= {(): _model((), 9.0, 0.0), THREE[:1]: _model(THREE[:1], 5.0, 3.0)}
@@ -209,13 +211,18 @@ def test_values_of_presets_are_free_from_the_effects_on_beside_which_they_alone_
     monkeypatch.setattr(joint_stage._Stage, "joint_search", lambda *_: search)
     monkeypatch.setattr(joint_stage, "fitted_model", lambda *_: _model((), 9.0, 0.0))
     monkeypatch.setattr(joint_stage, "fitted_from", lambda *_: _model((), 9.0, 0.0))
-    monkeypatch.setattr(joint_stage, "search_jointly", lambda *_: _model(THREE, 5.0, 9.0))
+    many, freed = _model(THREE, 5.0, 9.0), _model(THREE[:1], left, 9.0)
+    monkeypatch.setattr(joint_stage, "search_jointly", lambda *_: many)
     resumed: list[tuple[str, ...]] = []
-    monkeypatch.setattr(
-        joint_stage._Stage, "resumed", lambda _, search, found, most: resumed.append((*found.effects, str(most)))
-    )
-    stage._from_base(np.zeros(3), ())
-    assert resumed == [(*THREE[:1], "1")]
+
+    def resume(_: object, search: object, found: Any, most: int = 4) -> tuple[object, object]:
+        resumed.append((*found.effects, str(most)))
+        return search, freed if most == 1 else many
+
+    monkeypatch.setattr(joint_stage._Stage, "resumed", resume)
+    found = stage._from_base(np.zeros(3), ())[1]
+    further, best = ([], freed) if left < many.rms else ([(*THREE, "4")], many)
+    assert (resumed, found) == ([(*THREE[:1], "1"), *further], best)
 
 
 @pytest.mark.parametrize(
@@ -302,7 +309,7 @@ def test_a_wrong_record_is_asked_for_once_where_many_effects_leave_many_noises(
     stage.setting.wrong_record = wrong_record
     search.fitted |= {effects: _model(effects, 5.0, odds) for effects, odds in ((THREE[:1], 3.0), (THREE[1:], 1.0))}
     assert not stage.has_wrong_record(search, cast(Any, _model(THREE, 3.0, 9.0)))  # little is missing
-    many = cast(Any, _model(THREE, 5.0, 9.0))
+    many = _model(THREE, 5.0, 9.0)
     assert not stage.has_wrong_record(search, many)  # no run keeps anything from the others: it is not asked yet
     assert stage.has_wrong_record(search, many)
     assert search.wrong_record is FOUND

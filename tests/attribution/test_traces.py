@@ -1,0 +1,24 @@
+"""Traces of candidate effects: places of one effect are one effect."""
+
+from __future__ import annotations
+
+from smajax.attribution.joint_search import REPLACED, _effects, _neighbours
+from smajax.attribution.laplace_evidence import fitted_model
+from smajax.attribution.subset_evidence import linear_model
+from smajax.attribution.traces import traces_at
+from tests.helpers.hot_weight import NOISE, hot_weight
+
+
+def test_places_of_an_effect_take_no_other_effects_place_among_those_that_are_fitted() -> None:
+    """A creep is looked at at three time constants beside its own: likelier than any play, it is fitted at one of them."""
+    names = ("creep", "sensor_backlash", "latent_heat", "sensor_gain")
+    search = hot_weight({"creep.martensite": 5e-11}, names)
+    values = search.joint.problem.start_values()
+    present = fitted_model(search.joint, ("latent_heat",), values, ("latent_heat",))
+    linear = linear_model(search.joint, traces_at(search.joint, present, search.extent), NOISE**2, names)
+    assert sum(one.effect == "creep" for one in linear.places) == 4
+    near = [frozenset(_effects(search, one)) for one in _neighbours(search, linear, present, 10.0 * NOISE)]
+    assert len(near) == len(set(near))
+    assert len([one for one in near if len(one) == 1]) == REPLACED  # each in the place of the latent heat
+    assert frozenset({"creep"}) in near
+    assert {frozenset({"latent_heat", "creep"}), frozenset({"latent_heat", "sensor_backlash"})} <= set(near)
