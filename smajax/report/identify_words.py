@@ -24,7 +24,7 @@ FAR = 2.0  # standard deviations of what was known before, from which on an esti
 NAMED = 3  # parameters of a headline
 HELD = 4  # names of held values in a sentence
 OFF = 1.25  # ratio of residual to noise that is worth a sentence
-LACKING = 3.0  # such a ratio, from which an autocorrelated residual is the model's and not single samples'
+LACKING = 3.0  # noises, from which an autocorrelated residual is the model's and not single samples'
 
 
 def answer(result: Identified) -> str:
@@ -127,7 +127,7 @@ def conclusions(result: Identified) -> list[str]:
             "itself shows: part of it is what the model lacks, and was given the weight of noise."
         )
     # What a model lacks is not normally distributed either, and no other loss makes it less.
-    lacking = result.whiteness_p < WHITE and max(one.ratio for one in result.outputs) > LACKING
+    lacking = result.whiteness_p < WHITE and max(one.over_noise for one in result.outputs) > LACKING
     if result.normality_p < WHITE and not result.robust and not lacking:
         sentences.append(
             f"It is not normally distributed ({p_value(result.normality_p)}): if single samples are far off, fit by Huber's "

@@ -148,8 +148,15 @@ def test_samples_far_off_do_not_move_a_robust_fit(tmp_path: Path) -> None:
 
 def test_another_loss_is_not_advised_where_the_model_lacks_something(found: Identified) -> None:
     skewed = dataclasses.replace(found, whiteness_p=1e-9, normality_p=1e-9)
-    for ratio, advised in ((1.2, True), (30.0, False)):
-        output = dataclasses.replace(found.outputs[0], ratio=ratio)
+    sigma = found.outputs[0].noise_sigma
+    # Of a noise that was estimated with the fit the residual is as large as that, whatever neighbouring samples show.
+    for ratio, before, advised in (
+        (1.2, None, True),
+        (30.0, None, False),
+        (1.0, sigma, True),
+        (1.0, sigma / 30.0, False),
+    ):
+        output = dataclasses.replace(found.outputs[0], ratio=ratio, noise_before=before)
         said = conclusions(dataclasses.replace(skewed, outputs=(output,)))
         assert any("Huber" in sentence for sentence in said) == advised
 
