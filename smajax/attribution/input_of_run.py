@@ -127,7 +127,7 @@ class _Compared:
 
     def _leaves_more(self, left: float) -> bool:
         """Whether so much (root mean square, SI) is more than noise, or at the end of a search too little less than the present model leaves."""
-        return left > MOST_LEFT * self.noise or (self.times_less is None and not self._explains(left))
+        return not self._explains(left) if self.times_less is None else left > MOST_LEFT * self.noise
 
     def on_trial(self, fits: Sequence[Fit]) -> list[Fit]:
         """Those that take most of what the base model leaves and leave more than noise, and are likelier than the present model."""

@@ -252,11 +252,10 @@ def _several_at_once(
     level = float(np.sqrt(error * search.noise))
     traces = traces_there()
     linear = _climbed(search, present, traces, level)
-    reached = {_effects(search, one): one for one in _once(search, linear.ranked())[:REACHED]}
     sets = {
         effects: one
-        for effects, one in reached.items()
-        if effects not in search.fitted and linear.rms(one) < LEAVES_IN_LINEAR * search.noise
+        for one in _once(search, linear.ranked())[:REACHED]
+        if (effects := _effects(search, one)) not in search.fitted and linear.rms(one) < LEAVES_IN_LINEAR * search.noise
     }
     if not sets:
         return None

@@ -111,7 +111,7 @@ class Actuator:
             xi = b.left(min(max(b.amplitude * share, 0.0), 1.0))
             slope = b.sign * b.amplitude * steepness * by_temperature
             k, drift = -by_stress / by_temperature, -b.sign * by_done / by_temperature  # |xi'| = -sign xi'
-        e = w.young_modulus_austenite + xi * (w.young_modulus_martensite - w.young_modulus_austenite)
+        e = w.modulus(xi)
         sign = 0 if b is None else b.sign
         eps, alpha, delta = self.strains.per_fraction(xi, stress, sign), self.strains.expansion, 0.0
         if self.strains.mismatch:

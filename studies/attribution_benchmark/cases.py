@@ -43,8 +43,6 @@ COUPON_PAIRS = (
     ("asymmetric_transformation", "minor_loops"),
     ("stress_dependent_strain", "dead_band"),
 )
-
-
 # What a bench of somebody else may differ by: three effects of three equations.
 TRIPLES = (
     ("free_convection", "coulomb_friction", "elastic_mismatch"),
@@ -115,16 +113,11 @@ def cases(drawn: int = 0) -> list[Case]:
                 found.append(Case(rig, (name,), 0.0, 0))
                 continue
             found += [Case(rig, (name,), strength, i) for i, strength in enumerate(STRENGTHS)]
-    for rig in RIGS:
-        for pair in COUPON_PAIRS if rig == "coupon" else PAIRS:
-            if any(absorbed(name, rig) for name in pair):
-                continue
-            found.append(Case(rig, pair, STRENGTHS[1], 0))
-            found.append(Case(rig, pair, STRENGTHS[2], 1))
-    for rig in RIGS:
-        for triple in COUPON_TRIPLES if rig == "coupon" else TRIPLES:
-            if all(applies(name, rig) for name in triple):
-                found += [Case(rig, triple, strength, i) for i, strength in enumerate(STRENGTHS[1:])]
+    for loaded, coupon in ((PAIRS, COUPON_PAIRS), (TRIPLES, COUPON_TRIPLES)):
+        for rig in RIGS:
+            for several in coupon if rig == "coupon" else loaded:
+                if all(applies(name, rig) and not absorbed(name, rig) for name in several):
+                    found += [Case(rig, several, strength, i) for i, strength in enumerate(STRENGTHS[1:])]
     return [replace(case, number=case.number + ANEW * drawn) for case in found]
 
 

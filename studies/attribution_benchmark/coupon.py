@@ -51,8 +51,7 @@ def strain(wire: Wire, times: Vector, run: Run, effects: Effects) -> Vector:
                     pair[b.sign > 0].renew(seen, stress, done, xi)
         done += abs(xi - old)
         middle = (xi + old) / 2
-        modulus = wire.young_modulus_austenite + middle * (wire.young_modulus_martensite - wire.young_modulus_austenite)
-        total += (strains.expansion - wire.thermal_modulus / modulus) * change
+        total += (strains.expansion - wire.thermal_modulus / wire.modulus(middle)) * change
         total += strains.per_fraction(middle, stress, sign) * (xi - old)
         total += strains.softened(old, xi, stress, (path[k] + path[k - 1]) / 2)
         if strains.creep:

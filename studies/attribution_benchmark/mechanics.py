@@ -70,18 +70,18 @@ class Strains:
 
     def softened(self, old: float, xi: float, stress: float, temperature: float) -> float:
         """Strain gained as the fraction goes from `old` to `xi`, and the modulus with it: of sigma = E eps_elastic + theta_T (T - T_inf)."""
-        wire = self.wire
-        hot, cold = wire.young_modulus_austenite, wire.young_modulus_martensite
-        before, after = (hot + one * (cold - hot) for one in (old, xi))
-        elastic = stress - wire.thermal_modulus * (temperature - wire.ambient_temperature)
-        return self.mismatch * elastic * (1.0 / after - 1.0 / before)
+        before, after = (self.wire.modulus(one) for one in (old, xi))
+        return self.mismatch * self._elastic(stress, temperature) * (1.0 / after - 1.0 / before)
 
     def softening(self, xi: float, stress: float, temperature: float) -> float:
         """The rate of `softened` by the fraction."""
         wire = self.wire
-        hot, cold = wire.young_modulus_austenite, wire.young_modulus_martensite
-        elastic = stress - wire.thermal_modulus * (temperature - wire.ambient_temperature)
-        return self.mismatch * elastic * (hot - cold) / (hot + xi * (cold - hot)) ** 2
+        softer = wire.young_modulus_austenite - wire.young_modulus_martensite
+        return self.mismatch * self._elastic(stress, temperature) * softer / wire.modulus(xi) ** 2
+
+    def _elastic(self, stress: float, temperature: float) -> float:
+        """E times the elastic strain: the stress less its thermal part."""
+        return stress - self.wire.thermal_modulus * (temperature - self.wire.ambient_temperature)
 
     def per_fraction(self, xi: float, stress: float, sign: int) -> float:
         """Strain per unit of martensite fraction; `sign` of the active branch, +1 heating."""

@@ -50,6 +50,10 @@ class Wire:
         """Cooled surface, m^2 per metre."""
         return math.pi * self.wire_diameter
 
+    def modulus(self, xi: float) -> float:
+        """E of a martensite fraction, Pa."""
+        return self.young_modulus_austenite + xi * (self.young_modulus_martensite - self.young_modulus_austenite)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Load:

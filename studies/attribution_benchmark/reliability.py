@@ -58,7 +58,7 @@ def read(folders: Sequence[Path]) -> list[Given]:
     for folder in folders:
         for path in sorted((folder / "judged").glob("*.json")):
             one = load(path)
-            if one.kind in ("null", "single", "pair", "triple"):
+            if one.kind in ("null", "single") or one.several:
                 report = json.loads((folder / "reports" / path.name).read_text(encoding="utf-8"))
                 result.extend(given(one, report))
     return result
