@@ -70,6 +70,8 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
     for number in range(MOST_ROUNDS):
         present = fit_continued(search, present, error, _stage(search, number) if number else BEGINS)
         error = search.error(present)
+        if present.effects and search.needs_presets(present):
+            break
         if len(present.effects) >= MANY and search.has_wrong_record(present):
             break
         if present.effects in checked or any(len(effects) >= MANY for effects in left):
@@ -353,5 +355,5 @@ def _begun(
             if set(effects) - set(traces.present):
                 # And, where an effect is new, from its usual size: near zero the misfit may have a minimum of its own.
                 usual = at_usual_size(joint, subset, traces, start)
-                begun.append(BegunFit(effects, usual, linear.width_factors))
+                begun += [BegunFit(effects, one, linear.width_factors) for one in usual]
     return begun

@@ -15,6 +15,7 @@ from smajax.attribution.doubtful_runs import Left, left_without
 from smajax.attribution.exclusive_effects import replaceable
 from smajax.attribution.findings import LikelierModel, NoLikelierModel, Reason, Round, StepDependent
 from smajax.attribution.fitted_sets import JointRound, JointSearch
+from smajax.attribution.freed_presets import freed_at_the_base, freed_by_a_step, needs_presets
 from smajax.attribution.input_of_run import FAR_LESS
 from smajax.attribution.joint_search import (
     MANY,
@@ -36,9 +37,6 @@ from smajax.model.effects.library import LIBRARY
 from smajax.model.effects.prior_width import CoefficientPrior
 
 LIKELIEST = 4  # sets of effects from which the search goes on with the values of presets free
-FREED_SHARE = 2.0 / 3.0  # of the base error, to which free values of presets lower it where the search begins so
-FREED_BY_A_STEP = 0.5  # of what many effects leave, to which values of presets lower it by one Gauss-Newton step where the search with these held ends
-AS_LITTLE = 1.5  # times as much: such a step does not tell models apart
 
 
 @dataclass
@@ -112,9 +110,10 @@ class _Stage:
         free.programs = programs
         before = fitted_model(held.joint, (), base, ())
         after = fitted_from(free, before)
-        if after.rms < FREED_SHARE * before.rms:
+        if freed_at_the_base(after, before):
             return free, search_jointly(free, {(): after.values})
         held.programs = free.programs
+        held.needs_presets = partial(needs_presets, held, free)
         found = search_jointly(held, {(): base})
         if held.free_beside is not None:
             freed, instead = self.resumed(held, held.fitted[held.free_beside], most=1)
@@ -152,7 +151,7 @@ class _Stage:
         left = [self._without_runs(search, one) for one in models]
         better = [any(one.stands_out for one in its_left) for its_left in left]
         # That of the base model with values of presets free was fitted before.
-        by_a_step = None if search.thorough else _freed_by_a_step(models[1:], left[1:], found)
+        by_a_step = None if search.thorough else freed_by_a_step(models[1:], left[1:], found)
         if not any(better):
             search.free_beside = by_a_step
             return search.free_beside is not None
@@ -283,17 +282,6 @@ class _Stage:
 
     def _note(self, chosen: str, reason: Reason) -> None:
         self.setting.note(Round(len(self.setting.rounds) + 1, (), chosen, reason))
-
-
-def _freed_by_a_step(
-    models: Sequence[FittedModel], left: Sequence[Sequence[Left]], found: FittedModel
-) -> tuple[str, ...] | None:
-    """Effects of the smallest of `models` of which values of presets take as much as of any, where that is most of what `found` leaves; None elsewhere."""
-    of_all = [its_left[0].of_all for its_left in left]
-    if min(of_all) > FREED_BY_A_STEP * found.rms:
-        return None
-    alike = [model for model, rms in zip(models, of_all, strict=True) if rms <= AS_LITTLE * min(of_all)]
-    return min(alike, key=lambda one: len(one.effects)).effects
 
 
 def likeliest_so_far(search: JointSearch, best: FittedModel) -> tuple[JointSearch, Model, Model]:

@@ -43,9 +43,12 @@ def starts(joint: JointParameters, subset: Subset, linear: LinearModel, traces: 
     return [_off_bounds(joint, one) for one in points]
 
 
-def at_usual_size(joint: JointParameters, subset: Subset, traces: Traces, start: np.ndarray) -> np.ndarray:
-    """`start` (P,) with the switches of new effects at their initial guess, on the side where they are."""
-    changed = np.array(start)
+def at_usual_size(joint: JointParameters, subset: Subset, traces: Traces, start: np.ndarray) -> list[np.ndarray]:
+    """`start` (P,) with the switches of new effects at their initial guess: on the side where they are, and on the usual side where that is another.
+
+    What fits without an effect has other parameters make up for it, so that the derivative at nothing may point to the wrong side.
+    """
+    changed, usual = np.array(start), np.array(start)
     for variant in subset:
         if variant.effect in traces.present:
             continue
@@ -54,7 +57,8 @@ def at_usual_size(joint: JointParameters, subset: Subset, traces: Traces, start:
             k, (low, high) = joint.slots[name], joint.bounds[name]
             base, guess = joint.priors[name].base, guesses.get(name.split(".", 1)[1], joint.priors[name].sigma)
             changed[k] = np.clip(base + np.copysign(abs(guess - base), changed[k] - base), low, 0.5 * (base + high))
-    return changed
+            usual[k] = np.clip(guess, low, 0.5 * (base + high))
+    return [changed] if np.array_equal(changed, usual) else [changed, usual]
 
 
 def _begin(
