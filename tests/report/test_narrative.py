@@ -141,7 +141,8 @@ def test_each_cluster_of_correlated_parameters_has_one_line_with_advice() -> Non
         found("specific_heat", RemarkKind.CORRELATED, "convection_coefficient"),
         found("convection_coefficient", RemarkKind.CORRELATED, "specific_heat"),
         found("damping", RemarkKind.PRIOR),
-        found("density", RemarkKind.COMBINATION, "load_mass"),
+        found("density", RemarkKind.COMBINATION, "load_mass", "lever"),
+        found("load_mass", RemarkKind.COMBINATION, "density", "lever"),
     )
     findings = dataclasses.replace(
         made_findings(),
@@ -155,8 +156,9 @@ def test_each_cluster_of_correlated_parameters_has_one_line_with_advice() -> Non
         "specific_heat and convection_coefficient are correlated in these runs: what one has too much"
     )
     assert "add a fit run that separates them" in advice
-    (advice,) = [one for one in limits if one.startswith("Of density these runs determine combinations alone.")]
-    assert "`smajax identify experiment.toml --design`" in advice
+    (group,) = [place for place, one in enumerate(limits) if "combinations alone" in one]
+    assert limits[group].startswith("Of density, load_mass and lever these runs determine combinations alone")
+    assert "`smajax identify experiment.toml --design`" in limits[group + 1]
     assert any(one.startswith("damping: determined by its prior") for one in limits)
     assert not any("scale of the wire's temperature" in one for one in limits)
 

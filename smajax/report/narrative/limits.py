@@ -57,20 +57,26 @@ def _correlated(findings: Findings) -> Iterator[str]:
 
 def _remarks(findings: Findings) -> Iterator[str]:
     known = {name for cluster in findings.correlated for name in cluster}
+    blended: dict[frozenset[str], None] = {}  # parameters of which the runs determine combinations, each group once
     for one in findings.after:
-        if one.remark and one.name not in known:
+        if one.remark.kind is RemarkKind.COMBINATION:
+            blended[frozenset({one.name, *one.remark.others})] = None
+        elif one.remark and one.name not in known:
             measured = one.standard_error is not None
             yield f"{one.name}: {remark_text(one.remark)}" + (
                 ": known less well than alone." if measured else "; its value is not measured by these runs."
             )
-    blended = [one.name for one in findings.after if one.remark.kind is RemarkKind.COMBINATION]
+    order = {one.name: place for place, one in enumerate(findings.after)}
+    for group in blended:
+        names = sorted(group, key=lambda name: (order.get(name, len(order)), name))
+        yield f"Of {and_listed(names)} these runs determine combinations alone, and the value of none of them."
     if blended:
         yield (
-            f"Of {and_listed(blended)} these runs determine combinations alone. {separated(findings)} Where the equations have their "
-            "product alone (density and specific heat) no run separates them."
+            f"{separated(findings)} Where the equations have a product of such parameters alone (density and specific heat) no run separates them."
         )
-    degrees = [one.name for one in findings.after if one.unit == "degC" and one.name in blended]
-    if degrees and "convection_coefficient" in blended:
+    open_ones = frozenset[str]().union(*blended)
+    degrees = [one.name for one in findings.after if one.unit == "degC" and one.name in open_ones]
+    if degrees and "convection_coefficient" in open_ones:
         yield (
             f"{and_listed(degrees)} {'is' if len(degrees) == 1 else 'are'} open together with the convection because the scale of the wire's temperature over the air's is: with convection, specific "
             "heat and stress slopes changed alike the output is the same, under every load and however slow the run. A measured temperature of the "
