@@ -20,6 +20,8 @@ def of_priors(findings: Findings) -> Iterator[str]:
                 own = _spread(one.library_base, one.library_width, one.library_logarithmic, one.unit, one.name)
                 library = f"{own} by the library"
             ours = _spread(one.base, one.width, one.logarithmic, one.unit, one.name)
+            if library == f"{ours} by the library":
+                continue  # as `smajax new-experiment` drafts it
             without = f"; without it {one.name} has its bounds alone" if one.of_unknown else f", and {library}"
             yield f"The prior of {one.name} is {ours} by the experiment file{without}."
 
