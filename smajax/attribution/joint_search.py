@@ -70,9 +70,7 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
     for number in range(MOST_ROUNDS):
         present = fit_continued(search, present, error, _stage(search, number) if number else BEGINS)
         error = search.error(present)
-        if present.effects and search.needs_presets(present):
-            break
-        if len(present.effects) >= MANY and search.has_wrong_record(present):
+        if search.needs_presets(present) or (len(present.effects) >= MANY and search.has_wrong_record(present)):
             break
         if present.effects in checked or any(len(effects) >= MANY for effects in left):
             # Not before a round has removed what a model of many effects has too much.

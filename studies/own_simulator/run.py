@@ -59,11 +59,6 @@ def _lines(*corners: tuple[float, float]) -> np.ndarray:
     return np.interp(np.arange(COUNT) * SAMPLE, seconds, currents)
 
 
-def _waves() -> np.ndarray:
-    seconds = np.arange(COUNT) * SAMPLE
-    return 1.3 + 0.5 * np.sin(2.0 * np.pi * seconds / 23.0) + 0.25 * np.sin(2.0 * np.pi * seconds / 7.0)
-
-
 def commands() -> dict[str, np.ndarray]:
     """Current of each run, A, as a converter of three decimals gives it."""
     runs = {
@@ -86,7 +81,6 @@ def commands() -> dict[str, np.ndarray]:
             *((0.2, 3.8), (2.4, 2.1), (0.6, 5.6), (2.0, 3.6), (0.5, 4.9), (2.2, 2.4), (0.9, 7.0), (1.7, 5.2)),
             *((0.3, 4.2), (2.1, 2.7), (0.6, 5.5), (1.9, 3.7), (0.8, 6.5), (2.2, 2.0), (0.5, 10)),
         ),
-        "waves": _waves(),
     }
     return {name: np.round(current, 3) for name, current in runs.items()}
 

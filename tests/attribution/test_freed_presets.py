@@ -60,17 +60,17 @@ def test_it_goes_on_where_they_change_little_or_noise_is_left() -> None:
     assert held.free_beside is None
 
 
-def test_the_search_asks_beside_every_model_with_effects() -> None:
+def test_the_search_asks_of_every_model_that_it_goes_on_from() -> None:
     held, _ = _searches(1.0)
     asked: list[tuple[str, ...]] = []
 
     def needs(found: FittedModel) -> bool:
         asked.append(found.effects)
-        return True
+        return bool(found.effects)
 
     held.needs_presets = needs
     found = search_jointly(held, {(): held.joint.problem.start_values()})
-    assert asked == [LATENT] == [found.effects]
+    assert (asked, found.effects) == ([(), LATENT], LATENT)
     assert len(held.rounds) == 1
 
 
