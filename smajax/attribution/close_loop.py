@@ -17,13 +17,7 @@ from smajax.attribution.assembled_findings import findings_of, known_so_far
 from smajax.attribution.config import AttributionConfig
 from smajax.attribution.context import Context, Interim, Outcome
 from smajax.attribution.declared_priors import of_unknowns
-from smajax.attribution.findings import (
-    Findings,
-    NoiseWithoutRun,
-    PredictsTooLittle,
-    Rejected,
-    Remaining,
-)
+from smajax.attribution.findings import Findings, Rejected, Remaining
 from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.held_out import compare, validated
 from smajax.attribution.input_of_run import FAR_LESS, corrected, record_errors, standing
@@ -40,6 +34,7 @@ from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.neutral_at_base import check_neutral
 from smajax.attribution.outlier_run import outlier_runs
+from smajax.attribution.reasons import NoiseWithoutRun, PredictsTooLittle
 from smajax.attribution.record_error import NO_RECORDS, CorrectedRecords, FoundRecordErrors, NotConfirmed
 from smajax.attribution.record_fits import MOST_LEFT
 from smajax.attribution.same_as_parameters import said_by_parameters

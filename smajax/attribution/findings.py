@@ -10,12 +10,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from importlib import import_module
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal
 
 import numpy as np
 
 from smajax.attribution.config import AttributionConfig
 from smajax.attribution.prior_finding import PriorFinding
+from smajax.attribution.reasons import HeldOutWorse, Reason, StepDependent
 from smajax.attribution.record_error import OutlierRun, RecordError
 from smajax.attribution.run_finding import AveragedRun as AveragedRun
 from smajax.attribution.run_finding import OutputFinding as OutputFinding
@@ -114,72 +115,6 @@ class EffectFinding:
     added: bool
     coefficients: dict[str, CoefficientFinding]
     evidence: dict[str, float]  # posterior_probability, alone_rmse_fit, score_p_value_at_the_end, ...
-
-
-@dataclass(frozen=True)
-class StepDependent:
-    """Effects that lose their gain when the step is halved."""
-
-    effects: str  # joined by " + "
-    gain_kept: float  # share
-
-
-@dataclass(frozen=True)
-class LikelierModel:
-    """A set of effects is likelier than the present one, by log evidence and prior odds."""
-
-    before: str  # effects joined by " + "
-    log_odds: float  # over the model before
-    compared: tuple[tuple[str, float, float], ...]  # (effects, log odds over the model before, rms SI on the fit runs)
-
-
-@dataclass(frozen=True)
-class NoLikelierModel:
-    """None of the sets of effects that were fitted is likelier than the present one."""
-
-    compared: tuple[tuple[str, float, float], ...]
-
-
-@dataclass(frozen=True)
-class PredictsTooLittle:
-    """With the effects the model explains too little of the motion in left-out runs for them to mean anything."""
-
-    explained_variance: float
-    least: float
-
-
-@dataclass(frozen=True)
-class NoiseWithoutRun:
-    """Without one run the base model leaves noise."""
-
-    run: str
-
-
-@dataclass(frozen=True)
-class UnknownTermLikelier:
-    """One unknown function in one equation is likelier than all the effects."""
-
-    title: str
-    log_odds: float
-
-
-@dataclass(frozen=True)
-class HeldOutWorse:
-    """The held-out runs do not validate the effects."""
-
-    rmse_without: float  # SI
-    rmse_with: float
-
-
-Reason: TypeAlias = (
-    StepDependent
-    | LikelierModel
-    | NoLikelierModel
-    | PredictsTooLittle
-    | NoiseWithoutRun
-    | UnknownTermLikelier
-    | HeldOutWorse
-)
 
 
 @dataclass(frozen=True)

@@ -13,19 +13,14 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.config import AttributionConfig
-from smajax.attribution.findings import (
-    HeldOutWorse,
-    OutputFinding,
-    Rejected,
-    ResidualDiagnostics,
-    RunFinding,
-)
+from smajax.attribution.findings import OutputFinding, Rejected, ResidualDiagnostics, RunFinding
 from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.job import Job
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.optimum import final_model, without
 from smajax.attribution.paired_errors import Comparison, pooled_rms, runs_compared
+from smajax.attribution.reasons import HeldOutWorse
 from smajax.attribution.residual_diagnostics import diagnosed, noise_by_output, noise_like
 from smajax.attribution.run_finding import BesideModels
 from smajax.attribution.values_per_run import on_runs

@@ -11,11 +11,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from smajax.attribution.findings import DroppedModel, HeldOutWorse, StepDependent
+from smajax.attribution.findings import DroppedModel
 from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.paired_errors import compared, pooled_rms
+from smajax.attribution.reasons import HeldOutWorse, StepDependent
 from smajax.attribution.step_size_check import gain_kept_at_half_step
 from smajax.attribution.values_per_run import held_out_owners, held_out_residuals
 from smajax.model.effects.library import LIBRARY

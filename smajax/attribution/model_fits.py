@@ -17,8 +17,9 @@ import numpy as np
 from smajax.attribution.config import AttributionConfig
 from smajax.attribution.declared_priors import NONE_DECLARED
 from smajax.attribution.every_effect import EVERY
-from smajax.attribution.findings import Reason, Round
+from smajax.attribution.findings import Round
 from smajax.attribution.joint_parameters import JointParameters
+from smajax.attribution.reasons import Reason
 from smajax.attribution.record_error import FoundRecordErrors
 from smajax.attribution.residual_diagnostics import noise_by_output
 from smajax.attribution.run_extent import extent_of

@@ -10,11 +10,11 @@ import pytest
 
 from smajax.attribution import likely_models_check
 from smajax.attribution.averaged_prediction import averaged, likely_models
-from smajax.attribution.findings import HeldOutWorse, StepDependent
 from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.joint_search import search_jointly
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.optimum import as_model
+from smajax.attribution.reasons import HeldOutWorse, StepDependent
 from smajax.core.result_cache import ResultCache
 from smajax.fit.packed_runs import RunBatch
 from smajax.fit.prediction_band import BAND

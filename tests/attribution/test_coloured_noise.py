@@ -11,7 +11,7 @@ import pytest
 from scipy.signal import lfilter
 
 from smajax.attribution.close_loop import close_loop
-from smajax.attribution.findings import HeldOutWorse
+from smajax.attribution.reasons import HeldOutWorse
 from smajax.core.parameters import parameter_values
 from smajax.data.experiment.load import load_experiment
 from smajax.data.experiment.record import Experiment

@@ -14,10 +14,9 @@ import pytest
 from smajax.attribution import joint_stage
 from smajax.attribution.close_loop import close_loop, prepared
 from smajax.attribution.config import AttributionConfig
-from smajax.attribution.findings import Findings, LikelierModel, StepDependent
+from smajax.attribution.findings import Findings
 from smajax.attribution.joint_stage import search_by_evidence
-from smajax.attribution.laplace_evidence import fitted_model
-from smajax.attribution.optimum import as_model
+from smajax.attribution.reasons import LikelierModel, StepDependent
 from smajax.attribution.record_error import FoundRecordErrors, RecordError
 from smajax.attribution.unknown.search import AskedFor, Lacking
 from smajax.core.progress import quiet
@@ -30,7 +29,6 @@ from smajax.model.effects.library import LIBRARY
 from smajax.report.html import findings_to_html
 from smajax.report.json_file import findings_to_json
 from smajax.report.narrative import narrate
-from tests.helpers.hot_weight import NOISE, hot_weight
 
 FEW = ("latent_heat", "sensor_gain", "radiation")
 
@@ -386,15 +384,3 @@ def test_without_what_held_out_runs_reject_nothing_is_asked_for_again(monkeypatc
     assert not stage.has_wrong_record(
         cast(Any, SimpleNamespace(noise=1.0, thorough=True)), cast(Any, _model(THREE, 5.0, 9.0))
     )
-
-
-def test_effects_stand_by_how_much_the_model_needs_them_even_where_it_was_never_fitted_without() -> None:
-    """An unfinished page is of such a model; in the library the latent heat stands before the contrast of the resistances."""
-    truth = {"latent_heat.enthalpy": 200.0, "phase_resistance.contrast": -0.2}
-    search = hot_weight(truth)
-    values = search.joint.problem.start_values()
-    for name, value in truth.items():
-        values[search.joint.slots[name]] = value
-    effects = ("latent_heat", "phase_resistance")
-    search.fitted[effects] = fitted_model(search.joint, effects, values, effects)
-    assert as_model(search, search.fitted[effects], NOISE).effects == effects[::-1]

@@ -16,9 +16,10 @@ from scipy.interpolate import BSpline
 
 from smajax.attribution.config import AttributionConfig
 from smajax.attribution.context import Outcome
-from smajax.attribution.findings import UnknownTerm, UnknownTermLikelier
+from smajax.attribution.findings import UnknownTerm
 from smajax.attribution.formulas import formulas
 from smajax.attribution.model_fits import Model, Search
+from smajax.attribution.reasons import UnknownTermLikelier
 from smajax.attribution.unknown.ranges import Sought
 from smajax.attribution.unknown.search import Lacking, _explains, in_place_of, unknown_terms
 from smajax.attribution.unknown.spline import COUNT, WAVES, design, powers_of, spline

@@ -10,8 +10,6 @@ from smajax.attribution.findings import (
     CoefficientFinding,
     EffectFinding,
     Findings,
-    LikelierModel,
-    NoLikelierModel,
     ParameterFinding,
     ResidualDiagnostics,
     Role,
@@ -19,6 +17,7 @@ from smajax.attribution.findings import (
     RunFinding,
     Verdict,
 )
+from smajax.attribution.reasons import LikelierModel, NoLikelierModel
 from smajax.fit.identifiability import Checks, Identifiability
 from smajax.fit.integration import IntegrationError
 from smajax.fit.uncertainty import Remark, RemarkKind

@@ -16,12 +16,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from smajax.attribution.explained_share import EXPLAINED, explained_share
-from smajax.attribution.findings import UnknownTerm, UnknownTermLikelier
+from smajax.attribution.findings import UnknownTerm
 from smajax.attribution.formulas import formulas
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model
 from smajax.attribution.leave_one_run_out import predicting
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.paired_errors import compared, pooled_rms
+from smajax.attribution.reasons import UnknownTermLikelier
 from smajax.attribution.unknown.ranges import Sought
 from smajax.attribution.unknown.spline import design
 from smajax.attribution.unknown.term_fits import (

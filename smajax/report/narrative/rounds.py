@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from smajax.attribution.findings import (
+from smajax.attribution.findings import Round
+from smajax.attribution.reasons import (
     HeldOutWorse,
     LikelierModel,
+    NoiseWithoutEffects,
     NoiseWithoutRun,
     NoLikelierModel,
     PredictsTooLittle,
     Reason,
-    Round,
     StepDependent,
     UnknownTermLikelier,
 )
@@ -41,6 +42,8 @@ def reason_text(reason: Reason, unit: str, quantity: str, most: int | None = Non
                 f"set aside: with it the model explains {share:.0%} of the motion in runs left out, and under {least:.0%} "
                 "an effect means nothing"
             )
+        case NoiseWithoutEffects(log_odds):
+            return f"set aside: what the base model leaves is noise as well, and with it the model is likelier by {log_odds:.1f} in log odds only"
         case NoiseWithoutRun(run):
             return f"set aside: without {run} what the base model leaves is noise"
         case UnknownTermLikelier(title, log_odds):
