@@ -42,7 +42,7 @@ class JointSearch:
     before_the_end: Callable[[FittedModel], FittedModel | None] = lambda _: None
     # Whether the record of one run is wrong where a model of many effects leaves many noises: the search ends, and is made again with it corrected.
     has_wrong_record: Callable[[FittedModel], bool] = lambda _: False
-    # Whether it ends with a model because values of presets, which it holds, are what is missing beside its effects.
+    # Whether it ends with a model because values of presets, which it holds, can make up for most of what that leaves.
     needs_presets: Callable[[FittedModel], bool] = lambda _: False
     wrong_record: FoundRecordErrors | None = None
     free_beside: tuple[str, ...] | None = (

@@ -23,9 +23,9 @@ def freed_at_the_base(freed: FittedModel, held: FittedModel) -> bool:
 
 
 def needs_presets(search: JointSearch, free: JointSearch, found: FittedModel) -> bool:
-    """Whether `search`, in which the values of presets are held, ends because these are most of what is missing beside the effects of `found`.
+    """Whether `search`, in which the values of presets are held, ends because these can make up for most of what the effects of `found` leave.
 
-    What is added beside wrong values stands in for them. Once for each set of effects, by a fit in `free`, which has that of the base model.
+    What is added beside wrong values stands in for them; beside free ones the evidence tells which of the two it is. Once for each set of effects, by a fit in `free`, which has that of the base model.
     """
     if found.effects in free.fitted or HALVED * found.rms < search.noise:
         return False

@@ -117,8 +117,11 @@ class _Stage:
         held.needs_presets = partial(needs_presets, held, free)
         found = search_jointly(held, {(): base})
         if held.free_beside is not None:
+            kept_by_a_fit = found.effects == held.free_beside  # and not promised by a step
+            if kept_by_a_fit:
+                held.fitted[found.effects] = free.fitted.get(found.effects, found)
             freed, instead = self.resumed(held, held.fitted[held.free_beside], most=1)
-            if instead.rms < found.rms or freed.wrong_record:
+            if kept_by_a_fit or instead.rms < found.rms or freed.wrong_record:
                 return freed, instead
             held.programs = freed.programs  # one step had promised more than a fit came to
         return (held, found) if held.wrong_record else self.resumed(held, found)

@@ -44,11 +44,14 @@ def starts(joint: JointParameters, subset: Subset, linear: LinearModel, traces: 
 
 
 def at_usual_size(joint: JointParameters, subset: Subset, traces: Traces, start: np.ndarray) -> list[np.ndarray]:
-    """`start` (P,) with the switches of new effects at their initial guess: on the side where they are, and on the usual side where that is another.
+    """`start` (P,) with the switches of new effects at their initial guess: on the side where they are, and on the usual side, to which their range is wider, where that is another.
 
-    What fits without an effect has other parameters make up for it, so that the derivative at nothing may point to the wrong side.
+    What fits without an effect has other parameters make up for it, so that the derivative at nothing may point to the wrong side. There the unknowns are not moved along it.
     """
     changed, usual = np.array(start), np.array(start)
+    own = [joint.slots[name] for name in joint.unknowns]
+    usual[own] = traces.values[own]
+    other_side = False
     for variant in subset:
         if variant.effect in traces.present:
             continue
@@ -57,8 +60,10 @@ def at_usual_size(joint: JointParameters, subset: Subset, traces: Traces, start:
             k, (low, high) = joint.slots[name], joint.bounds[name]
             base, guess = joint.priors[name].base, guesses.get(name.split(".", 1)[1], joint.priors[name].sigma)
             changed[k] = np.clip(base + np.copysign(abs(guess - base), changed[k] - base), low, 0.5 * (base + high))
-            usual[k] = np.clip(guess, low, 0.5 * (base + high))
-    return [changed] if np.array_equal(changed, usual) else [changed, usual]
+            usual[k] = changed[k]
+            if (guess - base) * (changed[k] - base) < 0.0 and high - base > base - low:
+                usual[k], other_side = min(guess, 0.5 * (base + high)), True
+    return [changed, usual] if other_side else [changed]
 
 
 def _begin(

@@ -58,7 +58,7 @@ def grouped_sets(
 
 def fitted_from(search: JointSearch, model: FittedModel) -> FittedModel:
     """The effects of `model`, fitted with every free parameter of `search` from its values; `model` where that fit has no number."""
-    return _to_its_end(search, model, search.error(model), "fitting the base model with the values of presets free")
+    return _to_its_end(search, model, search.error(model), "fitting with the values of presets free")
 
 
 def fit_continued(search: JointSearch, model: FittedModel, error: float, stage: str) -> FittedModel:

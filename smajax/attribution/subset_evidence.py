@@ -114,8 +114,10 @@ class LinearModel:
         columns = self._columns(subset)
         matrix = self.gram[np.ix_(columns, columns)] + np.diag(self.precision[columns])
         # `solve` would warn of a matrix that is nearly singular, as it is where the runs do not tell parameters apart.
-        factor = scipy.linalg.cho_factor(matrix)
-        return columns, scipy.linalg.cho_solve(factor, self.right[columns])
+        try:
+            return columns, scipy.linalg.cho_solve(scipy.linalg.cho_factor(matrix), self.right[columns])
+        except np.linalg.LinAlgError:  # by rounding: of a set that is impossible here, and may be fitted all the same
+            return columns, np.linalg.lstsq(matrix, self.right[columns])[0]
 
     def climb(self, start: Subset) -> Subset:
         """From `start` by adding, removing or replacing one effect at a time, as long as the evidence rises."""

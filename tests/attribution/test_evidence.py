@@ -85,6 +85,16 @@ def test_the_search_over_sets_ends_at_the_best_of_all() -> None:
         assert linear.climb(frozenset({A, B})) == best
 
 
+def test_a_set_that_is_singular_to_rounding_is_impossible_and_still_has_an_estimate() -> None:
+    """It may be fitted whatever the linear model says, and a fit needs a start."""
+    linear, _, _ = _linear(False, (1.0, 0.5))
+    linear.gram = np.asarray([[1.0, 1.0 + 1e-9], [1.0 + 1e-9, 1.0]])
+    linear.precision, linear.right = np.zeros(2), np.ones(2)
+    both = frozenset({A, B})
+    assert linear.log_evidence(both) == -np.inf
+    assert sum(linear.estimate(both).coefficients.values()) == pytest.approx(1.0, rel=1e-3)
+
+
 def test_laplaces_evidence_is_the_linear_models_where_the_model_is_linear() -> None:
     linear, columns, outputs = _linear(False, (1.5, -1.0))
     estimate = np.linalg.solve(columns.T @ columns + np.eye(2), columns.T @ outputs)

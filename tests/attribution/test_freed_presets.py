@@ -76,7 +76,7 @@ def test_the_search_asks_of_every_model_that_it_goes_on_from() -> None:
 
 def test_a_fit_begins_on_the_usual_side_as_well_where_the_derivative_points_to_the_other() -> None:
     """Other parameters make up for an effect that is not in a fit, and then a small one of the wrong sign may be better than none."""
-    search = hot_weight({}, ("elastic_mismatch", "latent_heat"))
+    search = hot_weight({}, ("elastic_mismatch", "sensor_gain"))
     joint = search.joint
     base = joint.problem.start_values()
     traces = traces_at(joint, fitted_model(joint, (), base, ()), search.extent)
@@ -88,3 +88,13 @@ def test_a_fit_begins_on_the_usual_side_as_well_where_the_derivative_points_to_t
         assert [one[here] for one in found] == sizes
         for one in found:
             np.testing.assert_array_equal(np.delete(one, here), np.delete(base, here))
+    # There the unknowns begin where they were.
+    strain = joint.slots["recoverable_strain"]
+    start[[here, strain]] = -0.1, 1.1 * base[strain]
+    found = at_usual_size(joint, frozenset({Variant("elastic_mismatch", -1)}), traces, start)
+    assert [one[strain] / base[strain] for one in found] == [1.1, 1.0]
+    # An effect that may as well be of either sign has no usual side.
+    gain = joint.slots["sensor_gain.error"]
+    start[gain] = -0.01
+    (one,) = at_usual_size(joint, frozenset({Variant("sensor_gain", -1)}), traces, start)
+    assert one[gain] < 0.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from smajax.attribution.findings import Findings
 from smajax.core.wording import and_listed
@@ -67,12 +67,11 @@ def _remarks(findings: Findings) -> Iterator[str]:
                 ": known less well than alone." if measured else "; its value is not measured by these runs."
             )
     order = {one.name: place for place, one in enumerate(findings.after)}
-    for group in blended:
+    for group in _connected(blended):
         names = sorted(group, key=lambda name: (order.get(name, len(order)), name))
-        yield f"Of {and_listed(names)} these runs determine combinations alone, and the value of none of them."
-    if blended:
         yield (
-            f"{separated(findings)} Where the equations have a product of such parameters alone (density and specific heat) no run separates them."
+            f"Of {and_listed(names)} these runs determine combinations alone, and the value of none of them. {separated(findings)} Where the equations have their "
+            "product alone (density and specific heat) no run separates them."
         )
     open_ones = frozenset[str]().union(*blended)
     degrees = [one.name for one in findings.after if one.unit == "degC" and one.name in open_ones]
@@ -82,6 +81,15 @@ def _remarks(findings: Findings) -> Iterator[str]:
             "heat and stress slopes changed alike the output is the same, under every load and however slow the run. A measured temperature of the "
             "wire, runs in air of another temperature, or one of these values known tells it."
         )
+
+
+def _connected(groups: Iterable[frozenset[str]]) -> list[frozenset[str]]:
+    """Groups that have a name in common as one."""
+    found: list[frozenset[str]] = []
+    for group in groups:
+        joined = [one for one in found if one & group]
+        found = [*(one for one in found if one not in joined), group.union(*joined)]
+    return found
 
 
 def _weak_test(findings: Findings) -> Iterator[str]:

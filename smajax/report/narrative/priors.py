@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 
 from smajax.attribution.findings import Findings
+from smajax.attribution.prior_finding import PriorFinding
 from smajax.core.display_units import digits, display
 
 
@@ -20,10 +21,17 @@ def of_priors(findings: Findings) -> Iterator[str]:
                 own = _spread(one.library_base, one.library_width, one.library_logarithmic, one.unit, one.name)
                 library = f"{own} by the library"
             ours = _spread(one.base, one.width, one.logarithmic, one.unit, one.name)
-            if library == f"{ours} by the library":
+            if _as_the_library(one):
                 continue  # as `smajax new-experiment` drafts it
             without = f"; without it {one.name} has its bounds alone" if one.of_unknown else f", and {library}"
             yield f"The prior of {one.name} is {ours} by the experiment file{without}."
+
+
+def _as_the_library(one: PriorFinding) -> bool:
+    """Whether it says the same, to the digits of a file."""
+    pairs = ((one.base, one.library_base), (one.width, one.library_width))
+    alike = all(ours is not None and own is not None and math.isclose(ours, own, rel_tol=1e-3) for ours, own in pairs)
+    return alike and one.logarithmic == one.library_logarithmic
 
 
 def _spread(base: float, width: float, logarithmic: bool, unit: str, name: str) -> str:
