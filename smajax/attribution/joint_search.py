@@ -32,6 +32,7 @@ from smajax.fit.starts import nearest
 
 BEGINS = "fitting what the search begins with"
 USUAL_ROUNDS = "most searches end after 3 to 10"  # of the benchmark: 80 % of them, 6 in the median
+MANY_ROUNDS = 10, "most searches have ended by now"
 MOST_ROUNDS = 20  # the evidence rises in every one of them, so this only ends what should have ended
 FITTED = 4  # sets a round
 ALONE = 2  # and, beside the base model, of the effects of these sets the likeliest ones alone
@@ -330,7 +331,9 @@ def _asked(
 
 
 def _stage(search: JointSearch, number: int) -> str:
-    return f"round {search.rounds_before + number + 1} ({USUAL_ROUNDS}): fitting the likeliest sets of effects"
+    now = search.rounds_before + number + 1
+    usual = USUAL_ROUNDS if now <= MANY_ROUNDS[0] else MANY_ROUNDS[1]
+    return f"round {now} ({usual}): fitting the likeliest sets of effects"
 
 
 def _begun(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ from smajax.core.parameters import set_parameters
 from smajax.model.extended import extended
 from smajax.model.presets import build
 from smajax.simulation.compiled import simulate_compiled
-from studies.own_simulator.run import BENCHES, SAMPLE, commands, true_coefficients
+from studies.own_simulator.run import BENCHES, NOISE, SAMPLE, closed, commands, true_coefficients
 from studies.own_simulator.simulator import Bench, simulated
 
 SAMPLES = 900
@@ -80,3 +82,13 @@ def test_the_package_with_the_true_effects_gives_what_the_simulator_gives(
 
     assert misfit("") < 4e-4
     assert {one for one in names if misfit(one) > 1e-3} == shown
+
+
+@pytest.mark.slow
+def test_the_loop_names_what_the_simulator_has_and_the_base_model_lacks(tmp_path: Path) -> None:
+    found = closed(tmp_path, "no-friction")
+    assert found["verdict"] == "explained"
+    assert set(found["added"]) == ALL - {"coulomb_friction"}
+    for name in ("free_convection.exponent", "liang_conditions.share", "elastic_mismatch.contrast"):
+        assert found["sizes"][name] == pytest.approx(found["true"][name], rel=0.1)
+    assert found["rmse"]["partial strokes"][1] < 1.1 * NOISE
