@@ -7,9 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from smajax.attribution.doubtful_runs import Left
 from smajax.attribution.fitted_sets import JointSearch
-from smajax.attribution.laplace_evidence import FittedModel
+from smajax.attribution.joint_parameters import JointParameters
+from smajax.attribution.laplace_evidence import FittedModel, fitted_model
 from smajax.attribution.side_by_side import fitted_from
 
 FREED_SHARE = 2.0 / 3.0  # of the base error, to which free values of presets lower it where the search begins so
@@ -34,6 +37,15 @@ def needs_presets(search: JointSearch, free: JointSearch, found: FittedModel) ->
         return False
     search.free_beside = found.effects
     return True
+
+
+def nearer_base(joint: JointParameters, fitted: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Where the base model begins with the values of presets free, (P,): where it was `fitted` with these held, or where a search has `known` it, whichever leaves less.
+
+    From held ones it may end in a local minimum that an effect beside it does not have.
+    """
+    first, second = (fitted_model(joint, (), values, ()) for values in (fitted, known))
+    return known if second.rms < first.rms else fitted
 
 
 def freed_by_a_step(

@@ -15,7 +15,7 @@ from smajax.attribution.doubtful_runs import Left, left_without
 from smajax.attribution.exclusive_effects import replaceable
 from smajax.attribution.findings import Round
 from smajax.attribution.fitted_sets import JointRound, JointSearch
-from smajax.attribution.freed_presets import freed_at_the_base, freed_by_a_step, needs_presets
+from smajax.attribution.freed_presets import freed_at_the_base, freed_by_a_step, nearer_base, needs_presets
 from smajax.attribution.input_of_run import FAR_LESS
 from smajax.attribution.joint_search import (
     MANY,
@@ -247,7 +247,7 @@ class _Stage:
             for effects, values in starts.items():
                 starts[effects] = np.array(base)
                 starts[effects][new] = values[old]
-            starts[()] = base
+            starts[()] = nearer_base(again.joint, base, starts[()])
         return again, search_jointly(again, starts)
 
     def _starts(

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 from smajax.attribution.fitted_sets import JointSearch
-from smajax.attribution.freed_presets import freed_at_the_base, needs_presets
+from smajax.attribution.freed_presets import freed_at_the_base, nearer_base, needs_presets
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.joint_search import search_jointly
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model
@@ -98,3 +98,10 @@ def test_a_fit_begins_on_the_usual_side_as_well_where_the_derivative_points_to_t
     start[gain] = -0.01
     (one,) = at_usual_size(joint, frozenset({Variant("sensor_gain", -1)}), traces, start)
     assert one[gain] < 0.0
+
+
+def test_the_base_model_goes_on_from_where_less_is_left() -> None:
+    held, _ = _searches(1.0)
+    fitted, start = _fitted(held, ()).values, held.joint.problem.start_values()
+    assert nearer_base(held.joint, fitted, start) is fitted
+    assert nearer_base(held.joint, start, fitted) is fitted

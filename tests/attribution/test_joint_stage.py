@@ -349,10 +349,11 @@ def _begun(
 
 
 def test_with_a_finer_integration_the_search_goes_on_from_the_likeliest_models(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of these the base model begins where that integration has fitted it."""
+    """Of these the base model begins where that integration has fitted it, or where the search had it if less is left there."""
+    monkeypatch.setattr(joint_stage, "nearer_base", lambda _, fitted, known: fitted + 10.0 * known)
     starts = _begun(monkeypatch, cast(Any, joint_stage.search_again))
     assert set(starts) == {(), FEW[:1], FEW[:2]}
-    assert starts[()].tolist() == [1.0] * 5
+    assert starts[()].tolist() == [1.0, 11.0, 11.0, 1.0, 11.0]
     # What is not free now, and what there was not before or was held at none, lies where the base model has it.
     assert [values.tolist() for effects, values in starts.items() if effects] == [[0.0, 1.0, 1.0, 0.0, 1.0]] * 2
 
@@ -361,6 +362,7 @@ def test_with_a_record_corrected_the_search_begins_at_the_effects_beside_which_i
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """And at each of them alone, where it was fitted: most may have stood in for the record."""
+    monkeypatch.setattr(joint_stage, "nearer_base", lambda _, fitted, __: fitted)
     starts = _begun(
         monkeypatch,
         lambda setting, base, search: joint_stage.search_beside_a_record(setting, base, search, FEW[:2]),
