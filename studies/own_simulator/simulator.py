@@ -1,7 +1,7 @@
 """An SMA wire that pulls a slider against a spring, as an engineer writes it in numpy and scipy: no code of the package.
 
-Four things differ from the package's base model, of which `Bench` can do without all but the last: the convection is that of rising air, h = h_0 [(T - T_air)/50 K]^(1/4);
-the constitutive law is integrated, stress = E(xi) (strain - H xi) with a modulus of each phase; the guide has Coulomb friction; and the wire transforms by
+Three things differ from the package's base model, each of which `Bench` can do without: the convection is that of rising air, h = h_0 [(T - T_air)/50 K]^(1/4);
+the constitutive law is integrated, stress = E(xi) (strain - H xi) with a modulus of each phase; and the guide has Coulomb friction. The wire transforms by
 Liang and Rogers' rule, on heating to austenite and on cooling to martensite, whatever the stress does. The slider has no inertia: it rests while
 wire and spring differ by less than the friction, and else follows where they differ by just that.
 """

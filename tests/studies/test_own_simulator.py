@@ -41,32 +41,22 @@ def _as_the_bench(bench: Bench) -> dict[str, float]:
         "young_modulus_martensite": bench.moduli[1],
         "recoverable_strain": bench.recoverable_strain,
         "thermal_modulus": 0.0,
-        "slider_mass": 0.03,
+        "slider_mass": 3e-4,
         "damping": 0.5,
         "spring_stiffness": bench.stiffness,
         "spring_preload": bench.preload,
     }
 
 
-ALL = {"free_convection", "elastic_mismatch", "liang_conditions", "coulomb_friction"}
-LIANG = {"liang_conditions"}
+ALL = {"free_convection", "elastic_mismatch", "coulomb_friction"}
 
 
-# Liang's conditions show where the stress moves against the temperature, as with a slider that runs on where a pulse ends.
 @pytest.mark.parametrize(
-    ("bench", "name", "shown"),
-    [
-        ("all-four", "steps", ALL - LIANG),
-        ("all-four", "triangles", ALL - LIANG),
-        ("all-four", "pulses", ALL),
-        ("all-four", "partial strokes", ALL),
-        ("liang-alone", "pulses", LIANG),
-    ],
+    ("bench", "name"),
+    [("all-three", "steps"), ("all-three", "pulses"), ("all-three", "partial strokes"), ("nothing", "triangles")],
 )
-def test_the_package_with_the_true_effects_gives_what_the_simulator_gives(
-    bench: str, name: str, shown: set[str]
-) -> None:
-    """Two programs without a line in common, four equations of which are the effects' own: they differ by what a slider of 30 g does."""
+def test_the_package_with_the_true_effects_gives_what_the_simulator_gives(bench: str, name: str) -> None:
+    """Two programs without a line in common, three equations of which are the effects' own."""
     current, truth = commands()[name][:SAMPLES], BENCHES[bench]
     theirs, coefficients = simulated(truth, current, SAMPLE), true_coefficients(bench)
     names = tuple(dict.fromkeys(one.split(".")[0] for one in coefficients))
@@ -81,7 +71,7 @@ def test_the_package_with_the_true_effects_gives_what_the_simulator_gives(
         return float(np.std(ours - theirs) / np.ptp(theirs))
 
     assert misfit("") < 4e-4
-    assert {one for one in names if misfit(one) > 1e-3} == shown
+    assert all(misfit(one) > 1e-3 for one in names)
 
 
 @pytest.mark.slow
@@ -89,6 +79,6 @@ def test_the_loop_names_what_the_simulator_has_and_the_base_model_lacks(tmp_path
     found = closed(tmp_path, "no-friction")
     assert found["verdict"] == "explained"
     assert set(found["added"]) == ALL - {"coulomb_friction"}
-    for name in ("free_convection.exponent", "liang_conditions.share", "elastic_mismatch.contrast"):
+    for name in ("free_convection.exponent", "elastic_mismatch.contrast"):
         assert found["sizes"][name] == pytest.approx(found["true"][name], rel=0.1)
     assert found["rmse"]["partial strokes"][1] < 1.1 * NOISE
