@@ -32,7 +32,7 @@ from smajax.fit.starts import nearest
 
 BEGINS = "fitting what the search begins with"
 USUAL_ROUNDS = "most searches end after 3 to 10"  # of the benchmark: 80 % of them, 6 in the median
-MANY_ROUNDS = 10, "most searches have ended by now"
+MANY_ROUNDS = 10, "most searches have ended by now"  # what is said after so many
 MOST_ROUNDS = 20  # the evidence rises in every one of them, so this only ends what should have ended
 FITTED = 4  # sets a round
 ALONE = 2  # and, beside the base model, of the effects of these sets the likeliest ones alone

@@ -118,7 +118,7 @@ class _Stage:
         found = search_jointly(held, {(): base})
         if held.free_beside is not None:
             kept_by_a_fit = found.effects == held.free_beside  # and not promised by a step
-            if kept_by_a_fit:
+            if kept_by_a_fit:  # where the next search begins
                 held.fitted[found.effects] = free.fitted.get(found.effects, found)
             freed, instead = self.resumed(held, held.fitted[held.free_beside], most=1)
             if kept_by_a_fit or instead.rms < found.rms or freed.wrong_record:
