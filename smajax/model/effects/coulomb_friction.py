@@ -12,7 +12,7 @@ from smajax.model.types import Scalar
 
 LIMIT_WIDTH = Width(0.1, "guides and bearings: 0.02 to 0.2 of what they carry", of="load")
 BEND_WIDTH = Width(
-    1.0,
+    2.0,
     "presliding of rough contacts: micrometres to a tenth of a millimetre (Dahl 1968; Canudas de Wit et al. 1995)",
     logarithmic=True,
 )
