@@ -29,7 +29,7 @@ class AttributionConfig:
     most_filter_noise: float = 2.0  # innovation over the estimate; 1.6 where the coefficient is near one
     least_independent: int = 50  # samples; with fewer the test cannot reject a first-order noise
 
-    least_log_odds: float = 3.0  # of effects over a base model that leaves noise, from which these are named: twenty times as likely, as a wrong record has to be
+    least_log_odds: float = 3.0  # of effects over a model that leaves noise without them, from which they are named: twenty times as likely, as a wrong record has to be
 
     # Fits
     least_explained_variance: float = 0.5  # of the motion in left-out runs; below it the model's effects mean nothing

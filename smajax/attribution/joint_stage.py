@@ -25,8 +25,14 @@ from smajax.attribution.joint_search import (
 )
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model
 from smajax.attribution.model_fits import Evidence, Model, Search
-from smajax.attribution.optimum import as_model, final_model, refined, with_no_effect_too_many
-from smajax.attribution.reasons import LikelierModel, NoiseWithoutEffects, NoLikelierModel, Reason, StepDependent
+from smajax.attribution.optimum import (
+    as_model,
+    final_model,
+    refined,
+    with_no_effect_hardly_needed,
+    with_no_effect_too_many,
+)
+from smajax.attribution.reasons import LikelierModel, NoLikelierModel, Reason, StepDependent
 from smajax.attribution.same_as_parameters import said_by_parameters
 from smajax.attribution.side_by_side import fitted_from
 from smajax.attribution.step_size_check import gain_kept_at_half_step
@@ -362,8 +368,7 @@ def _kept_at_half_step(
         error = search.error(found)
         base_model = refined(search, search.fitted[()], search.error_of(()))
         first = as_model(search, base_model, error)
-        if _hardly_needed(setting, first, base_model, found, error):
-            found, search.winner = base_model, ()
+        found = with_no_effect_hardly_needed(search, setting, found, error)
         final = final_model(search, setting, found, error) if found.effects else first
         kept = gain_kept_at_half_step(setting, final, first)
         if kept >= setting.config.gain_kept_at_half_step:
@@ -376,15 +381,6 @@ def _kept_at_half_step(
         if (effect,) in search.fitted:
             seen.alone_rmse = search.fitted[(effect,)].rms
     return search, first, final
-
-
-def _hardly_needed(setting: Search, first: Model, base: FittedModel, found: FittedModel, error: float) -> bool:
-    """Whether the base model leaves noise and `found` is hardly likelier: nothing is missing then. Noted among the rounds."""
-    odds = found.log_evidence(error**2) - base.log_evidence(error**2)
-    if not found.effects or odds >= setting.config.least_log_odds or not setting.is_noise(first):
-        return False
-    setting.note(Round(len(setting.rounds) + 1, (), _joined(found.effects), NoiseWithoutEffects(odds), removed=True))
-    return True
 
 
 def effect_probabilities(search: JointSearch, error: float) -> dict[str, float]:

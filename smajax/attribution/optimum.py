@@ -6,11 +6,13 @@ import dataclasses
 
 import numpy as np
 
+from smajax.attribution.findings import Round
 from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.joint_search import noted
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model
 from smajax.attribution.leave_one_run_out import predicting
 from smajax.attribution.model_fits import Model, Search, Start
+from smajax.attribution.reasons import NoiseWithoutEffects
 from smajax.fit.levenberg_marquardt import levenberg_marquardt
 
 AS_LIKELY = 0.5  # log odds: of two models that are nearer the search's stays
@@ -29,6 +31,29 @@ def with_no_effect_too_many(search: JointSearch, found: FittedModel) -> FittedMo
         best = search.best(error)
         if best.log_evidence(error**2) - found.log_evidence(error**2) > AS_LIKELY:
             found = noted(search, found, best)
+    search.winner = found.effects
+    return found
+
+
+def with_no_effect_hardly_needed(search: JointSearch, setting: Search, found: FittedModel, error: float) -> FittedModel:
+    """`found` without effects, the least needed first, as long as what is left without them is noise and the model is hardly less likely (`least_log_odds`).
+
+    Nothing says then that they are there. Predictions are averaged with them all the same. Each is noted among the rounds.
+    """
+    most = found.log_evidence(error**2)
+    while found.effects:
+        # Those of the likeliest model have just been taken to their optimum (`with_no_effect_too_many`).
+        rests = {
+            effect: search.fitted.get(tuple(one for one in found.effects if one != effect))
+            or without(search, found, effect, error)
+            for effect in found.effects
+        }
+        effect, rest = max(rests.items(), key=lambda one: one[1].log_evidence(error**2))
+        odds = most - rest.log_evidence(error**2)
+        if odds >= setting.config.least_log_odds or not setting.is_noise(as_model(search, rest, error)):
+            break
+        setting.note(Round(len(setting.rounds) + 1, (), effect, NoiseWithoutEffects(odds), removed=True))
+        found = rest
     search.winner = found.effects
     return found
 

@@ -40,7 +40,7 @@ class PredictsTooLittle:
 
 @dataclass(frozen=True)
 class NoiseWithoutEffects:
-    """Without the effects the model leaves noise as well, and with them it is hardly likelier."""
+    """Without an effect the model leaves noise as well, and with it, and those removed before it, it is hardly likelier."""
 
     log_odds: float
 

@@ -1,4 +1,4 @@
-"""How much a model needs its effects: where the base model leaves noise nothing is missing, unless they are far likelier."""
+"""How much a model needs its effects: where it leaves noise without one nothing says that this is there, unless it is far likelier."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import Any, cast
 
 import pytest
 
+from smajax.attribution import optimum
 from smajax.attribution.config import AttributionConfig
 from smajax.attribution.findings import Round
-from smajax.attribution.joint_stage import _hardly_needed
 from smajax.attribution.laplace_evidence import fitted_model
 from smajax.attribution.optimum import as_model
 from smajax.attribution.reasons import NoiseWithoutEffects
@@ -21,25 +21,44 @@ def _fitted(effects: tuple[str, ...], evidence: float) -> Any:
 
 
 @pytest.mark.parametrize(
-    ("odds", "noise", "hardly"),
-    [(0.8, True, True), (2.9, True, True), (3.1, True, False), (0.8, False, False)],
+    ("evidence", "noise", "left"),
+    [
+        # Log evidence of creep + radiation, of creep, of radiation and of neither; the models that leave noise.
+        ((9.0, 8.2, 4.0, 7.5), ((), ("creep",)), ()),  # neither is needed
+        ((9.0, 8.2, 4.0, 5.5), ((), ("creep",)), ("creep",)),  # both together are
+        ((9.0, 8.2, 4.0, 7.5), (("creep",),), ("creep",)),  # nor is what is left without both noise
+        ((9.0, 5.9, 4.0, 7.5), ((), ("creep",)), ("creep", "radiation")),  # either is
+        ((9.0, 8.2, 4.0, 7.5), (), ("creep", "radiation")),  # more than noise is left without either
+    ],
 )
-def test_effects_are_named_over_noise_where_they_are_twenty_times_as_likely(
-    odds: float, noise: bool, hardly: bool
+def test_an_effect_is_named_over_noise_where_the_model_is_twenty_times_as_likely_with_it(
+    monkeypatch: pytest.MonkeyPatch,
+    evidence: tuple[float, ...],
+    noise: tuple[tuple[str, ...], ...],
+    left: tuple[str, ...],
 ) -> None:
+    both = ("creep", "radiation")
+    sets: tuple[tuple[str, ...], ...] = (both, both[:1], both[1:], ())
+    models = {effects: _fitted(effects, value) for effects, value in zip(sets, evidence, strict=True)}
+    monkeypatch.setattr(
+        optimum, "without", lambda _, model, effect, __: models[tuple(one for one in model.effects if one != effect)]
+    )
+    monkeypatch.setattr(optimum, "as_model", lambda _, model, __: model)
     rounds: list[Round] = []
     setting = cast(
         Any,
-        SimpleNamespace(config=AttributionConfig(), rounds=rounds, note=rounds.append, is_noise=lambda _: noise),
+        SimpleNamespace(
+            config=AttributionConfig(),
+            rounds=rounds,
+            note=rounds.append,
+            is_noise=lambda model: model.effects in noise,
+        ),
     )
-    base, found = _fitted((), 5.0), _fitted(("creep", "radiation"), 5.0 + odds)
-    assert _hardly_needed(setting, cast(Any, None), base, found, 1.0) is hardly
-    assert [(one.chosen, one.removed) for one in rounds] == [("creep + radiation", True)] * hardly
-    if hardly:
-        (said,) = rounds
-        assert isinstance(said.reason, NoiseWithoutEffects)
-        assert said.reason.log_odds == pytest.approx(odds)
-    assert not _hardly_needed(setting, cast(Any, None), base, base, 1.0)
+    search = cast(Any, SimpleNamespace(winner=both, fitted={both[:1]: models[both[:1]]}))
+    found = optimum.with_no_effect_hardly_needed(search, setting, models[both], 1.0)
+    assert found.effects == search.winner == left
+    assert [one.chosen for one in rounds] == [one for one in both[::-1] if one not in left]
+    assert all(one.removed and isinstance(one.reason, NoiseWithoutEffects) for one in rounds)
 
 
 def test_effects_stand_by_how_much_the_model_needs_them_even_where_it_was_never_fitted_without() -> None:

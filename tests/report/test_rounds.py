@@ -33,7 +33,7 @@ from smajax.report.narrative.rounds import reason_text
         ),
         (
             NoiseWithoutEffects(0.84),
-            "set aside: what the base model leaves is noise as well, and with it the model is likelier by 0.8 in log odds only",
+            "set aside: what is left without it is noise as well, and the model found is likelier by 0.8 in log odds only",
         ),
         (NoiseWithoutRun("a"), "set aside: without a what the base model leaves is noise"),
         (

@@ -43,7 +43,7 @@ def reason_text(reason: Reason, unit: str, quantity: str, most: int | None = Non
                 "an effect means nothing"
             )
         case NoiseWithoutEffects(log_odds):
-            return f"set aside: what the base model leaves is noise as well, and with it the model is likelier by {log_odds:.1f} in log odds only"
+            return f"set aside: what is left without it is noise as well, and the model found is likelier by {log_odds:.1f} in log odds only"
         case NoiseWithoutRun(run):
             return f"set aside: without {run} what the base model leaves is noise"
         case UnknownTermLikelier(title, log_odds):
