@@ -12,8 +12,9 @@ import numpy as np
 from smajax.attribution.doubtful_runs import Left
 from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.joint_parameters import JointParameters
-from smajax.attribution.laplace_evidence import FittedModel, fitted_model
+from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.side_by_side import fitted_from
+from smajax.fit.outputs_of_runs import sums_of_squares
 
 FREED_SHARE = 2.0 / 3.0  # of the base error, to which free values of presets lower it where the search begins so
 HALVED = 0.5  # of what effects leave, to which free values of presets lower it where the search with these held ends
@@ -44,8 +45,9 @@ def nearer_base(joint: JointParameters, fitted: np.ndarray, known: np.ndarray) -
 
     From held ones it may end in a local minimum that an effect beside it does not have.
     """
-    first, second = (fitted_model(joint, (), values, ()) for values in (fitted, known))
-    return known if second.rms < first.rms else fitted
+    problem, index = joint.restricted(())
+    first, second = sums_of_squares(problem, [fitted[index], known[index]])
+    return known if second < first else fitted
 
 
 def freed_by_a_step(

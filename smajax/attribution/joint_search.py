@@ -32,7 +32,8 @@ from smajax.fit.starts import nearest
 
 BEGINS = "fitting what the search begins with"
 USUAL_ROUNDS = "most searches end after 3 to 10"  # of the benchmark: 80 % of them, 6 in the median
-MANY_ROUNDS = 10, "most searches have ended by now"  # what is said after so many
+LATE = "most searches have ended by now"  # said after `MANY_ROUNDS`
+MANY_ROUNDS = 10
 MOST_ROUNDS = 20  # the evidence rises in every one of them, so this only ends what should have ended
 FITTED = 4  # sets a round
 ALONE = 2  # and, beside the base model, of the effects of these sets the likeliest ones alone
@@ -332,8 +333,7 @@ def _asked(
 
 def _stage(search: JointSearch, number: int) -> str:
     now = search.rounds_before + number + 1
-    usual = USUAL_ROUNDS if now <= MANY_ROUNDS[0] else MANY_ROUNDS[1]
-    return f"round {now} ({usual}): fitting the likeliest sets of effects"
+    return f"round {now} ({USUAL_ROUNDS if now <= MANY_ROUNDS else LATE}): fitting the likeliest sets of effects"
 
 
 def _begun(

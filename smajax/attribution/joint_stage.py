@@ -28,6 +28,7 @@ from smajax.attribution.model_fits import Evidence, Model, Search
 from smajax.attribution.optimum import (
     as_model,
     final_model,
+    leaves_noise,
     refined,
     with_no_effect_hardly_needed,
     with_no_effect_too_many,
@@ -38,7 +39,6 @@ from smajax.attribution.side_by_side import fitted_from
 from smajax.attribution.step_size_check import gain_kept_at_half_step
 from smajax.attribution.unknown.search import AskedFor, asked_for
 from smajax.attribution.unknown.terms import UNKNOWN
-from smajax.core.whiteness import on_samples
 from smajax.fit.levenberg_marquardt import Fit, FitSettings
 from smajax.model.effects.library import LIBRARY
 from smajax.model.effects.prior_width import CoefficientPrior
@@ -89,7 +89,7 @@ class _Stage:
         """
         search, found = self._from_base(base, ())
         doubted = [effect for effect in found.effects if LIBRARY[effect].candidate.prior_class != "material"]
-        if not doubted or search.wrong_record or len(found.effects) >= MANY or self._leaves_noise(found):
+        if not doubted or search.wrong_record or len(found.effects) >= MANY or leaves_noise(self.setting, found):
             return search, found
         # And without what looks much the same, which has been tried in their place.
         alike = {name for name in search.joint.coefficients for one in doubted if replaceable(name, one)}
@@ -106,8 +106,8 @@ class _Stage:
         """(the search, likeliest model), from the base model. `programs`: those that are compiled already.
 
         The values of presets are free from the beginning where they alone lower the base model's error much: with wrong values held, effects that
-        are not there are named in their place. Elsewhere they are held at first and free from the likeliest sets of effects on, for
-        from the base model alone fits that free them too may end in local minima.
+        are not there are named in their place. Elsewhere they are held at first, and free from the effects on beside which they take most of what is left, or
+        else from the likeliest sets of effects on: from the base model alone fits that free them too may end in local minima.
         """
         held = self.joint_search({})
         held.programs = programs
@@ -138,10 +138,10 @@ class _Stage:
         The effects then stand in for it, and every one that is added has less to go by. One effect of the function's equation that is
         likelier than they are comes first.
         """
-        if len(found.effects) < MANY or self._leaves_noise(found):
+        if len(found.effects) < MANY or leaves_noise(self.setting, found):
             return None
         named = self._asked(search).found.likeliest
-        if named is None or not self._leaves_noise(named) or not self._likelier(search, found, [named]):
+        if named is None or not leaves_noise(self.setting, named) or not self._likelier(search, found, [named]):
             return None
         return self._one_effect(search, found, [named]) or found
 
@@ -186,7 +186,9 @@ class _Stage:
 
     def before_the_end(self, search: JointSearch, found: FittedModel) -> FittedModel | None:
         """One effect that is likelier than those of `found`, in an equation where an unknown function is likelier than these too."""
-        if not found.effects or (len(found.effects) < self.setting.config.many_effects and self._leaves_noise(found)):
+        if not found.effects or (
+            len(found.effects) < self.setting.config.many_effects and leaves_noise(self.setting, found)
+        ):
             return None
         fits = self._asked(search).fits
         functions = self._likelier(search, found, () if fits is None else fits.fitted)
@@ -223,10 +225,6 @@ class _Stage:
         variance = min(map(search.error, (found, *models))) ** 2
         ahead = [one for one in models if one.log_evidence(variance) > found.log_evidence(variance)]
         return sorted(ahead, key=lambda one: -one.log_evidence(variance))
-
-    def _leaves_noise(self, model: FittedModel) -> bool:
-        mask = np.asarray(self.setting.problem.batch.mask)
-        return self.setting.all_noise(on_samples(model.residual, mask), mask)
 
     def resumed(
         self,

@@ -13,6 +13,7 @@ from smajax.attribution.laplace_evidence import FittedModel, fitted_model
 from smajax.attribution.leave_one_run_out import predicting
 from smajax.attribution.model_fits import Model, Search, Start
 from smajax.attribution.reasons import NoiseWithoutEffects
+from smajax.core.whiteness import on_samples
 from smajax.fit.levenberg_marquardt import levenberg_marquardt
 
 AS_LIKELY = 0.5  # log odds: of two models that are nearer the search's stays
@@ -50,12 +51,18 @@ def with_no_effect_hardly_needed(search: JointSearch, setting: Search, found: Fi
         }
         effect, rest = max(rests.items(), key=lambda one: one[1].log_evidence(error**2))
         odds = most - rest.log_evidence(error**2)
-        if odds >= setting.config.least_log_odds or not setting.is_noise(as_model(search, rest, error)):
+        if odds >= setting.config.least_log_odds or not leaves_noise(setting, rest):
             break
         setting.note(Round(len(setting.rounds) + 1, (), effect, NoiseWithoutEffects(odds), removed=True))
         found = rest
     search.winner = found.effects
     return found
+
+
+def leaves_noise(setting: Search, model: FittedModel) -> bool:
+    """Whether what a fitted model leaves of the fit runs is noise, by the residual that it has."""
+    mask = np.asarray(setting.problem.batch.mask)
+    return setting.all_noise(on_samples(model.residual, mask), mask)
 
 
 def refined(search: JointSearch, model: FittedModel, error: float) -> FittedModel:

@@ -1,6 +1,6 @@
 """The loop on benches of which some equations differ from the base model's, by a simulator that shares no code with the package.
 
-    python -m studies.own_simulator.run --out OUT                 # every bench
+    python -m studies.own_simulator.run --out OUT                     # every bench
     python -m studies.own_simulator.run --out OUT --only all-three     # or one
 
 Of each bench it writes the logs and the experiment, closes the loop, and says what was named, with which sizes, and the errors on the held-out runs.

@@ -43,7 +43,7 @@ def test_an_effect_is_named_over_noise_where_the_model_is_twenty_times_as_likely
     monkeypatch.setattr(
         optimum, "without", lambda _, model, effect, __: models[tuple(one for one in model.effects if one != effect)]
     )
-    monkeypatch.setattr(optimum, "as_model", lambda _, model, __: model)
+    monkeypatch.setattr(optimum, "leaves_noise", lambda _, model: model.effects in noise)
     rounds: list[Round] = []
     setting = cast(
         Any,
@@ -51,7 +51,6 @@ def test_an_effect_is_named_over_noise_where_the_model_is_twenty_times_as_likely
             config=AttributionConfig(),
             rounds=rounds,
             note=rounds.append,
-            is_noise=lambda model: model.effects in noise,
         ),
     )
     search = cast(Any, SimpleNamespace(winner=both, fitted={both[:1]: models[both[:1]]}))

@@ -1,4 +1,4 @@
-"""A user's own simulator: with its four differences in the model, the package gives what it gives."""
+"""A user's own simulator: with its three differences in the model, the package gives what it gives."""
 
 from __future__ import annotations
 
@@ -78,9 +78,8 @@ def test_the_package_with_the_true_effects_gives_what_the_simulator_gives(bench:
 def test_the_loop_names_what_the_simulator_has_and_the_base_model_lacks(tmp_path: Path) -> None:
     found = closed(tmp_path, "no-friction")
     assert found["verdict"] == "explained"
-    assert set(found["added"]) - {"liang_conditions"} == ALL - {
-        "coulomb_friction"
-    }  # Liang's rule is the simulator's too
+    # Liang's rule is the simulator's too.
+    assert set(found["added"]) - {"liang_conditions"} == ALL - {"coulomb_friction"}
     for name in ("free_convection.exponent", "elastic_mismatch.contrast"):
         assert found["sizes"][name] == pytest.approx(found["true"][name], rel=0.1)
     assert found["rmse"]["partial strokes"][1] < 1.1 * NOISE

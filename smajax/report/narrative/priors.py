@@ -15,14 +15,13 @@ def of_priors(findings: Findings) -> Iterator[str]:
     for one in findings.priors:
         if one.odds is not None and one.library_odds is not None:
             yield f"The prior odds of {one.name} are {one.odds:.3g} by the experiment file, and {one.library_odds:.3g} by the library."
-        if one.base is not None and one.width is not None:
+        # What says the same is as `smajax new-experiment` drafts it.
+        if one.base is not None and one.width is not None and not _as_the_library(one):
             library = "held without it"
             if one.library_base is not None and one.library_width is not None:
                 own = _spread(one.library_base, one.library_width, one.library_logarithmic, one.unit, one.name)
                 library = f"{own} by the library"
             ours = _spread(one.base, one.width, one.logarithmic, one.unit, one.name)
-            if _as_the_library(one):
-                continue  # as `smajax new-experiment` drafts it
             without = f"; without it {one.name} has its bounds alone" if one.of_unknown else f", and {library}"
             yield f"The prior of {one.name} is {ours} by the experiment file{without}."
 
