@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -24,10 +25,12 @@ ABSORBED = 1e-6
 def confounders(search: JointSearch, setting: Search, model: Model, runs: Sequence[Run]) -> tuple[Confounder, ...]:
     """For each effect of `model` the models that the search fitted with another effect in its place, likeliest first.
 
-    Those whose trace overlaps with the effect's by `overlap_listed`, or with a weight of `separating_weight`.
+    Those whose trace overlaps with the effect's by `overlap_listed`, with a weight of `separating_weight`, or that the runs alone do not tell from
+    the effect.
 
     A weight is the posterior probability of the model with the confounder among `model` and all confounders of the same
-    effect: by the evidence of their fits and the prior odds of the effects.
+    effect: by the evidence of their fits and the prior odds of the effects. Where the runs alone do not tell the two (`told_by_runs`), but would tell
+    the model without either, a small weight comes from the priors: from what is usual of the coefficients, and of presets' values.
     """
     own = search.joint.ordered(model.effects)
     if not own or own not in search.fitted:
@@ -45,15 +48,25 @@ def confounders(search: JointSearch, setting: Search, model: Model, runs: Sequen
         odds = np.exp([min(one.log_evidence(variance) - here, 500.0) for _, one in likened])
         for (other, one), share in zip(likened, odds / (1.0 + odds.sum()), strict=True):
             alike = _alike(search, traces, fitted, effect, other)
-            if share > setting.config.separating_weight:
+            ratio = _ratio(one, fitted, variance)
+            without = search.fitted.get(search.joint.ordered([name for name in own if name != effect]))
+            gained = math.inf if without is None else _ratio(one, without, variance)
+            told = setting.config.told_by_runs
+            same = share <= setting.config.separating_weight and ratio > -told and gained > told
+            if same or share > setting.config.separating_weight:
                 likely.append((len(found), one))
             elif not alike > setting.config.overlap_listed:
                 continue
-            found.append(Confounder(effect, other, alike, float(share), one.rms, "", float("nan")))
+            found.append(Confounder(effect, other, alike, float(share), one.rms, "", float("nan"), ratio, same))
     separated = separating_runs(setting, model, [one for _, one in likely], runs)
     for (place, _), (what, apart) in zip(likely, separated, strict=True):
         found[place] = dataclasses.replace(found[place], separating_run=what, separation=apart)
     return tuple(sorted(found, key=lambda one: -one.weight))
+
+
+def _ratio(one: FittedModel, other: FittedModel, variance: float) -> float:
+    """Log-likelihood ratio of `one` over `other` at their fits."""
+    return 0.5 * (other.squares - one.squares) / variance
 
 
 def _in_place_of(search: JointSearch, own: Sequence[str], effect: str) -> Iterator[tuple[str, FittedModel]]:

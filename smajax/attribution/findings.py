@@ -150,6 +150,9 @@ class Confounder:
     rmse_fit: float  # of the model that has it instead, on the fit runs, SI
     separating_run: str  # the run on which the two fitted models differ most; "" where none was looked for
     separation: float  # by how many times the noise, rms
+    # Of the model that has it instead over the one that was found, by the runs alone: without priors and prior odds.
+    log_likelihood_ratio: float = float("nan")
+    only_by_priors: bool = False  # the runs alone do not tell the two
 
 
 @dataclass(frozen=True)

@@ -117,3 +117,16 @@ def test_two_effects_with_the_same_trace_are_weighed_by_their_prior_odds() -> No
     (one,) = confounders(search, setting, model, runs)
     assert one.weight == pytest.approx(1.0 / (1.0 + np.e))
     assert one.separating_run != ""
+    assert one.log_likelihood_ratio == pytest.approx(0.0)
+    assert not one.only_by_priors  # it is likely enough by itself
+
+    # Of the same fit, and unlikely by what is usual of it alone.
+    search.fitted[twin.effects] = dataclasses.replace(twin, log_prior=found.log_prior - 10.0)
+    (unusual,) = confounders(search, setting, model, runs)
+    assert unusual.weight < 1e-4
+    assert unusual.only_by_priors
+    assert unusual.separating_run != ""
+    # And one that leaves more is told from it by the runs.
+    search.fitted[twin.effects] = dataclasses.replace(twin, squares=1.1 * found.squares)
+    told = confounders(search, setting, model, runs)
+    assert not any(one.only_by_priors for one in told)

@@ -273,6 +273,16 @@ def test_confounders_are_named_by_their_weight() -> None:
     assert not any("radiation" in one for one in narrate(findings(0.01)).cannot_know)
 
 
+def test_a_confounder_that_priors_alone_tell_is_minded_with_the_run_that_separates_it() -> None:
+    one = Confounder("latent_heat", "radiation", 0.81, 1e-5, 1e-4, "a ramp", 4.2, -1.21, only_by_priors=True)
+    said = _summary(confounders=(one,))
+    assert "do not tell latent heat of transformation from radiation to the surroundings" in said
+    assert "log-likelihood ratio -1.2" in said
+    assert "A run with a ramp would separate them by 4.2 times the noise." in said
+    plain = dataclasses.replace(one, only_by_priors=False)
+    assert "alone do not tell" not in _summary(confounders=(plain,))
+
+
 def nothing_added() -> Findings:
     findings = made_findings()
     effects = tuple(dataclasses.replace(effect, added=False) for effect in findings.effects)

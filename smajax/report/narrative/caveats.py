@@ -205,6 +205,21 @@ def of_priors_left(findings: Findings) -> Iterator[str]:
     )
 
 
+def of_what_priors_alone_tell(findings: Findings) -> Iterator[str]:
+    """Another effect that leaves as little in the place of one that was added, and is only less usual."""
+    titles = {effect.name: effect.title for effect in findings.effects}
+    for one in findings.confounders:
+        if one.only_by_priors:
+            run = one.separating_run
+            separating = (
+                f" A run with {run} would separate them by {one.separation:.1f} times the noise." if run else ""
+            )
+            yield (
+                f"Mind: the fit runs alone do not tell {titles[one.effect]} from {titles[one.confounder]}, with which in its place the model leaves {error_text(findings, one.rmse_fit)} "
+                f"(log-likelihood ratio {digits(one.log_likelihood_ratio, 2)}). It is less likely because its coefficients, or values of the preset beside it, would be less usual.{separating}"
+            )
+
+
 def of_the_preset(findings: Findings, effect: EffectFinding) -> str:
     """What an expansion says that takes back the one of the preset's theta_T: nothing of the wire, but of what was taken as known."""
     expansion = findings.preset_expansion
