@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from smajax.data.model_file.read import load_model as load_model
     from smajax.data.open_experiment import open_experiment as open_experiment
     from smajax.fit.base_model import base_model as base_model
+    from smajax.fit.experiment_check import check_experiment as check_experiment
     from smajax.fit.identify import identify as identify
     from smajax.fit.predict import predict as predict
     from smajax.fit.uncertain_presets import with_uncertain_presets as with_uncertain_presets
@@ -104,6 +105,7 @@ NAMES = {
     "base_model": ("smajax.fit.base_model", "base_model"),
     "build": ("smajax.model.presets", "build"),
     "check_bounds": ("smajax.core.parameters", "check_bounds"),
+    "check_experiment": ("smajax.fit.experiment_check", "check_experiment"),
     "close_loop": ("smajax.attribution.close_loop", "close_loop"),
     "compose": ("smajax.control.compose", "compose"),
     "extended": ("smajax.model.extended", "extended"),

@@ -11,6 +11,7 @@ import typer
 
 from smajax.cli.commands.app import app as app_command
 from smajax.cli.commands.bench import bench
+from smajax.cli.commands.check import check_command
 from smajax.cli.commands.close_loop import close_loop_command
 from smajax.cli.commands.demo import demo
 from smajax.cli.commands.doctor import doctor
@@ -72,6 +73,7 @@ def _all(
 COMMANDS: dict[str, Callable[..., None]] = {
     "app": app_command,
     "new-experiment": new_experiment,
+    "check": check_command,
     "identify": identify_command,
     "close-loop": close_loop_command,
     "predict": predict_command,

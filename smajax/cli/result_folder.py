@@ -22,6 +22,7 @@ LOCK = ".smajax.lock"  # stays, so that programs that come at the same moment lo
 # The last file of each command: a folder that has one but no hidden file is refused, since it may be the user's own.
 LAST = {
     "report.html": "close-loop",
+    "check.html": "check",
     "identify.html": "identify",
     "predict.html": "predict",
     "tune.html": "tune",

@@ -55,7 +55,7 @@ def _determined(checks: Checks) -> Iterator[str]:
     if checks.held_presets:
         yield (
             f"The file does not give {listed(checks.held_presets)}: held at the values of the presets, or at the base that [priors.presets] has. "
-            "`--presets fitted` fits them too, within what data sheets leave open, as close-loop does."
+            "`identify --presets fitted` fits them too, within what data sheets leave open, as close-loop does."
         )
     if checks.hidden_by_one_force:
         titles = and_listed([LIBRARY[name].candidate.title for name in checks.hidden_by_one_force])

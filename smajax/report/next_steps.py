@@ -144,6 +144,14 @@ def _in_python(model: Path) -> Step:
     return Step("Use it in Python", python=f"import smajax as sma; model = sma.load_model({model.as_posix()!r}).system")
 
 
+def after_check(experiment: str) -> list[Step]:
+    """experiment: path of its file."""
+    return [
+        Step("Fit the unknowns", command("identify", experiment, "--out", "identified")),
+        Step("Find what the model lacks", command("close-loop", experiment, "--out", "report")),
+    ]
+
+
 def after_identify(result: Identified, folder: Path, experiment: str) -> list[Step]:
     """experiment: path of its file."""
     model, steps = folder / MODEL, []

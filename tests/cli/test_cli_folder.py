@@ -71,7 +71,8 @@ def test_a_file_of_the_users_is_not_written_over(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("command", "own"), [("close-loop", "report.html"), ("identify", "identify.html"), ("sweep", "sweep.json")]
+    ("command", "own"),
+    [("close-loop", "report.html"), ("check", "check.html"), ("identify", "identify.html"), ("sweep", "sweep.json")],
 )
 def test_a_users_file_that_is_named_like_a_result_is_refused(tmp_path: Path, command: str, own: str) -> None:
     (tmp_path / own).write_text("mine")

@@ -23,7 +23,9 @@ from tests.helpers.command_line import DEMO
 pytestmark = pytest.mark.usefixtures("blank_pictures")
 
 
-@pytest.mark.parametrize("command", ["simulate", "sweep", "tune", "identify", "close-loop", "figures", "bench"])
+@pytest.mark.parametrize(
+    "command", ["simulate", "sweep", "tune", "check", "identify", "close-loop", "figures", "bench"]
+)
 def test_every_option_that_takes_a_quantity_says_its_unit(command: str) -> None:
     """A plain number is asked for where it is a share of something alone."""
     told = " ".join(CliRunner().invoke(app, [command, "--help"]).output.split())
@@ -44,7 +46,7 @@ def test_the_help_points_to_the_one_list_of_controllers(command: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "command", ["close-loop", "identify", "predict", "demo", "figures", "tune", "sweep", "simulate"]
+    "command", ["close-loop", "check", "identify", "predict", "demo", "figures", "tune", "sweep", "simulate"]
 )
 def test_every_command_with_a_page_opens_it_on_the_same_word(command: str) -> None:
     told = " ".join(CliRunner().invoke(app, [command, "--help"], terminal_width=200).output.split())

@@ -338,7 +338,7 @@ def test_the_checks_before_a_fit_are_messages_and_a_prior_without_use_is_a_warni
         "the fit allow.",
         "check: That is with d at the presets' values. The file does not give them, so the search fits them as well: what these runs then determine "
         "of each is said beside its value.",
-        "check: The file does not give c: held at the values of the presets, or at the base that [priors.presets] has. `--presets fitted` fits them "
+        "check: The file does not give c: held at the values of the presets, or at the base that [priors.presets] has. `identify --presets fitted` fits them "
         "too, within what data sheets leave open, as close-loop does.",
     ]
 

@@ -171,4 +171,6 @@ def _print(messages: Sequence[str], loaded: DraftFile, out: Path, ranked: bool) 
         typer.echo(NOT_LOADED if loaded.reason else NO_NUMBER if loaded.ranking is None else sentence(loaded.ranking))
     typer.echo(f"Written: {out.resolve()}")
     if not loaded.reason:
-        typer.echo(f"Next: check it, then `smajax close-loop {out} --out report`")
+        typer.echo(
+            f"Next: look at its runs and guesses by `smajax check {out}`, then `smajax close-loop {out} --out report`"
+        )
