@@ -113,7 +113,7 @@ def _rank_sentence(found: Identifiability, correlated: Sequence[str] | None) -> 
     if rank == unknowns:
         which = f"All {unknowns} unknowns are" if unknowns > 1 else "The one unknown is"
         later = (
-            ", each by itself as far as the correlations at the fit allow"
+            "; how far their estimates are correlated is known at the fit"
             if correlated is None and unknowns > 1
             else ""
         )
