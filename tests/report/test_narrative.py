@@ -50,7 +50,7 @@ def test_the_summary_of_an_effect_that_was_found() -> None:
         "On the held-out runs the average of the 2 likely models is off by 0.0202 mm, and 93% of the samples lie in its 90 % band.",
         "Measurement noise: 0.02 mm (estimated from the flat part of the runs).",
         "While it transforms the wire absorbs heat without getting warmer, and gives it back on cooling: both strokes are slower than the heat balance alone says, and the same at rest.",
-        "Mind: radiation to the surroundings leaves a trace in the score test (p = 4e-12 after 2 candidates) that would take 0.4% of the residual's square, but the model with it is no likelier.",
+        "Mind: radiation to the surroundings leaves a trace in the score test (p = 4e-12 after 2 candidates) that would take 0.4% of the residual's square, but the model with it is hardly likelier, if at all.",
     )
 
 
@@ -72,7 +72,7 @@ def test_effects_that_depend_on_the_step_or_hide_in_the_noise_are_reported_at_th
     assert "the integration leaves" not in said(adequate, 0.5, 0.1 * level)
     assert "creep leaves a trace in the score test (p = 1e-9 after 1 candidates)" in said(adequate, 1e-9, 0.0)
     assert "leaves a trace" not in said(adequate, 0.5, 0.0) + said(missing, 1e-9, 0.0)
-    assert "square, but the model with it is no likelier" in said(adequate, 1e-9, 0.0)
+    assert "square, but the model with it is hardly likelier, if at all" in said(adequate, 1e-9, 0.0)
     rejected = Rejected(("creep",), 1e-3, 2e-3)
     assert "square, but the held-out runs reject it" in said(adequate, 1e-9, 0.0, rejected=(rejected,))
     assert "autocorrelated, looks the same" in said(missing, 0.5, 0.0, 1.3)

@@ -86,7 +86,11 @@ def of_a_faint_trace(findings: Findings) -> list[str]:
     return [
         f"Mind: {first.title} leaves a trace in the score test (p = {digits(chance, 2)} after {len(left)} candidates) that would take "
         f"{first.evidence['score_gain_at_the_end']:.1%} of the residual's square"
-        + (", but the held-out runs reject it." if rejected else ", but the model with it is no likelier.")
+        + (
+            ", but the held-out runs reject it."
+            if rejected
+            else ", but the model with it is hardly likelier, if at all."
+        )
     ]
 
 
