@@ -68,7 +68,7 @@ class ExperimentCheck:
 def check_experiment(experiment: Experiment, progress: Progress = quiet) -> ExperimentCheck:
     """What `identify` and `close_loop` would begin with; nothing is fitted.
 
-    Raises ValueError when there is nothing to fit, and in float32.
+    Raises ValueError in float32.
     """
     options = Options(0, (), False, False, 0, SEED, ResultCache(None), as_progress(progress))
     setup = set_up(experiment, options)

@@ -64,6 +64,8 @@ def identify(  # ten parameters: the options of the command, by keyword
     options = Options(starts, profiled, robust, design, draws, seed, ResultCache(memory), as_progress(progress))
     begin = clock.monotonic()
     setup = set_up(experiment, options)
+    if not setup.unknowns:
+        raise ValueError(f"{experiment.path}: nothing is declared unknown; add a section [unknown.NAME].")
     checks = check_identifiability(setup, options)
     setup, fitted, integration = fit_within_tolerance(setup, options)
     statistics = statistics_at(setup, fitted, options)

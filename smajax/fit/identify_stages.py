@@ -112,8 +112,6 @@ def set_up(experiment: Experiment, options: Options) -> Setup:
         raise ValueError("identify needs float64: call `jax.config.update('jax_enable_x64', True)` first.")
     fit_runs = [run for run in experiment.runs if run.role == "fit"]
     unknowns = free_by_name(experiment, fit_runs)
-    if not unknowns:
-        raise ValueError(f"{experiment.path}: nothing is declared unknown; add a section [unknown.NAME].")
     if options.profiled and options.robust:
         raise ValueError("a profile is that of least squares: ask for it without Huber's loss.")
     if odd := [name for name in options.profiled if name not in unknowns]:

@@ -71,7 +71,7 @@ def normal_equations(
         value = _residual(problem, task, y, points[k], predicted[k], measured[k])
         jacobian = -_weight(problem, task) * problem.centred(derivatives[k, : len(task.slots)])
         prior = _priors(problem, task).slopes(points[k])[:, task.slots] * (task.high - task.low)
-        columns = jacobian.reshape(len(task.slots), -1), prior.T, np.diag(task.regularisation)
+        columns = jacobian.reshape(len(task.slots), derivatives[k, 0].size), prior.T, np.diag(task.regularisation)
         rows = np.concatenate(columns, axis=1)
         with np.errstate(over="ignore", invalid="ignore"):
             equations.append(

@@ -88,9 +88,14 @@ def test_what_cannot_be_read_leaves_nothing(tmp_path: Path) -> None:
     path = bench(tmp_path, ('unit = "mm"', 'unit = "mmm"'))
     assert "mmm" in refused("check", path, "--out", tmp_path / "out")
     assert not (tmp_path / "out").exists()
-    nothing = bench(tmp_path / "nothing")
-    text = nothing.read_text()
-    start = text.index("[unknown]")
-    nothing.write_text(text[:start] + text[text.index("[sampling]") :])
-    assert "nothing is declared unknown" in refused("check", nothing, "--out", tmp_path / "out")
-    assert not (tmp_path / "out" / "check.html").exists()
+
+
+def test_a_file_without_unknowns_is_checked_too(tmp_path: Path) -> None:
+    """As one is that `close-loop` takes as it is."""
+    path = bench(tmp_path)
+    before, _, rest = path.read_text().partition("[unknown]")
+    path.write_text(before + rest[rest.index("[sampling]") :])
+    ended = smajax("check", path, "--out", tmp_path / "out")
+    assert ended.code == 0, ended.said
+    assert "0 unknowns to fit" in ended.out
+    assert "Nothing is declared unknown" in ended.out
