@@ -177,7 +177,8 @@ def _not_in_library(findings: Findings) -> str:
             f"Something is missing: none of the {tried} candidate effects that were tried accounts for it in the fit runs and "
             "is validated on those that were held out."
         )
-    if not findings.unknown and not findings.explained_variance > findings.config.least_explained_variance:
+    named = any(term.named for term in findings.unknown)
+    if not named and not findings.explained_variance > findings.config.least_explained_variance:
         return (
             f"The model predicts hardly anything of these runs (explained variance {max(findings.explained_variance, 0.0):.0%} in runs left out), "
             f"and with none of the {tried} candidate effects that were tried enough for it to mean anything: none is named. Do "
