@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict
 from pathlib import Path
@@ -93,7 +93,8 @@ def table_text(rig: Rig, run: Run, read: Vector) -> str:
     return "\n".join(rows) + "\n"
 
 
-def experiment_text(rig: Rig, runs: tuple[Run, ...]) -> str:
+def experiment_text(rig: Rig, runs: tuple[Run, ...], known: Collection[str] = ()) -> str:
+    """The experiment file of these runs. known: of the wire's sheet, what it says exactly, and no prior is given for."""
     wire, load, drive = PRESETS[rig.name]
     lines = ['title = "Simulated measurement"', "", "[model]"]
     lines += [f'wire = "{wire}"', f'load = "{load}"', f'drive = "{drive}"', "", "[model.parameters]"]
@@ -111,7 +112,7 @@ def experiment_text(rig: Rig, runs: tuple[Run, ...]) -> str:
             f'{name} = {{ low = "{low:.6g} {unit}", high = "{high:.6g} {unit}", start = "{nominal:.6g} {unit}" }}'
         )
     lines += ["", "[priors.presets]"]
-    lines += [f"{name} = {{ relative = {width:g} }}" for name, width in on_the_sheet(rig).items()]
+    lines += [f"{name} = {{ relative = {width:g} }}" for name, width in on_the_sheet(rig).items() if name not in known]
     lines += ["", "[nuisance]", "offset = true", "", "[sampling]", f'step = "{1e3 * rig.clock.step:g} ms"']
     channel, column, unit = COMMAND[rig.name]
     lines += ["", f"[channels.{channel}]", 'role = "input"', f'column = "{column}"', f'unit = "{unit}"']

@@ -77,7 +77,7 @@ def write(out: Path, law: str) -> Path:
         noisy = read + random.normal(0.0, RIG.noise, read.size)
         (out / f"{run.name}.csv").write_text(table_text(RIG, run, noisy), encoding="utf-8")
     given = "\n".join(f'{name} = "{getattr(WIRE, name):.6g} {unit}"' for name, unit in GIVEN.items())
-    text = experiment_text(RIG, made)
+    text = experiment_text(RIG, made, GIVEN)
     text = text.replace("[model.parameters]", f'law = "{law}"\n\n[model.parameters]\n{given}')
     (out / "experiment.toml").write_text(text, encoding="utf-8")
     return out / "experiment.toml"

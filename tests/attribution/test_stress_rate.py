@@ -10,7 +10,7 @@ import pytest
 from smajax.attribution.close_loop import close_loop
 from smajax.data.experiment.load import load_experiment
 from smajax.data.model_catalogue import CATALOGUE
-from studies.stress_rate.run import told, write
+from studies.stress_rate.run import WIRE, told, write
 
 
 def _closed(folder: Path, law: str, only: str = "") -> dict[str, Any]:
@@ -28,6 +28,13 @@ def _found(answer: dict[str, Any]) -> None:
     before, after = errors["held-out twice"]
     assert before > 10.0 * noise
     assert after < 1.1 * noise
+
+
+def test_the_experiment_says_the_wire_is_known(tmp_path: Path) -> None:
+    """The loops on it are slow tests; what is wrong with its file shows here."""
+    experiment = load_experiment(write(tmp_path, "liang"), CATALOGUE)
+    assert not experiment.priors
+    assert experiment.parameters["stress_slope_austenite"] == pytest.approx(WIRE.stress_slope_austenite)
 
 
 @pytest.mark.slow  # the notebook of the same is run by `test_notebooks`, enhanced conditions included
