@@ -19,6 +19,7 @@ from smajax.model.rigs import arm
 from smajax.simulation.batch.axes import sampled
 from smajax.simulation.batch.chunks import chunks
 from smajax.simulation.batch.run_batch import run_batch
+from smajax.simulation.step import ORDER_TWO
 from tests.helpers.engine_results import same_batch
 from tests.model.test_every_effect import RIGS, _rig
 
@@ -53,7 +54,13 @@ HERE = [
 
 @pytest.mark.parametrize("effect", HERE)
 def test_a_batch_with_each_effect_equals_xla(effect: str) -> None:
-    same_batch(*both(_rig(effect), (effect,), None), 1e-9)
+    ours, theirs = both(_rig(effect), (effect,), None)
+    # Where a wire goes slack Newton's method ends on the other side of a kink, within its tolerance: there roundings decide.
+    slack = (np.asarray(theirs["stress"]) <= 0.0).any(axis=1) & (theirs["stress"].max() > 0.0).item()
+    assert not slack.all()
+    same_batch(ours.isel(sample=~slack), theirs.isel(sample=~slack), 1e-9)
+    if slack.any():
+        same_batch(ours.isel(sample=slack), theirs.isel(sample=slack), 2.0 * ORDER_TWO.enough)
 
 
 @pytest.mark.parametrize("rig", sorted(RIGS))
@@ -68,7 +75,7 @@ def test_the_loop_of_every_controller_equals_xla(controller: str, monkeypatch: p
     points = rig.before + np.asarray([[0.0], [-0.02], [0.03]])
     ours = rig.evaluate(np.clip(points, 0.0, 1.0), members, STEP)
 
-    def by_xla(function: Any, model: Any, axes: Any, size: int, wanted: Any) -> Any:
+    def by_xla(function: Any, model: Any, axes: Any, size: int, wanted: Any, engine: Any) -> Any:
         return chunks(function, model, axes, size, wanted, engine="xla")
 
     monkeypatch.setattr(evaluate, "chunks", by_xla)
