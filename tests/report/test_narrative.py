@@ -276,11 +276,17 @@ def test_confounders_are_named_by_their_weight() -> None:
 def test_a_confounder_that_priors_alone_tell_is_minded_with_the_run_that_separates_it() -> None:
     one = Confounder("latent_heat", "radiation", 0.81, 1e-5, 1e-4, "a ramp", 4.2, -1.21, only_by_priors=True)
     said = _summary(confounders=(one,))
-    assert "do not tell latent heat of transformation from radiation to the surroundings" in said
-    assert "log-likelihood ratio -1.2" in said
-    assert "A run with a ramp would separate them by 4.2 times the noise." in said
+    assert (
+        "hardly tell latent heat of transformation from radiation to the surroundings (log-likelihood ratio -1.2), with"
+        in said
+    )
+    assert "A run with a ramp would separate it from radiation to the surroundings by 4.2 times the noise." in said
+    assert "separate it" not in _summary(confounders=(dataclasses.replace(one, separation=0.2),))
+    both = _summary(confounders=(one, dataclasses.replace(one, confounder="sensor_lag", separation=5.0)))
+    assert both.count("Mind: the fit runs alone") == 1
+    assert "would separate it from" in both
     plain = dataclasses.replace(one, only_by_priors=False)
-    assert "alone do not tell" not in _summary(confounders=(plain,))
+    assert "alone hardly tell" not in _summary(confounders=(plain,))
 
 
 def nothing_added() -> Findings:

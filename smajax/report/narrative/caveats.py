@@ -28,6 +28,7 @@ NAMED_SIZES = 4  # in a sentence
 UNLIKE = 2.0  # by which the noises that outputs leave differ and are more than noise
 NORMAL_95 = 1.96
 UNUSUAL = 5.0  # widths of its prior that an effect is off
+LEAST_SEPARATION = 1.0  # noises by which a run has to separate two models to be worth doing
 EVEN = 0.5  # of a probability: as likely as not
 
 
@@ -210,18 +211,25 @@ def of_priors_left(findings: Findings) -> Iterator[str]:
 
 
 def of_what_priors_alone_tell(findings: Findings) -> Iterator[str]:
-    """Another effect that leaves as little in the place of one that was added, and is only less usual."""
+    """Other effects that leave as little in the place of one that was added, and are only less usual."""
     titles = {effect.name: effect.title for effect in findings.effects}
-    for one in findings.confounders:
-        if one.only_by_priors:
-            run = one.separating_run
-            separating = (
-                f" A run with {run} would separate them by {one.separation:.1f} times the noise." if run else ""
-            )
-            yield (
-                f"Mind: the fit runs alone do not tell {titles[one.effect]} from {titles[one.confounder]}, with which in its place the model leaves {error_text(findings, one.rmse_fit)} "
-                f"(log-likelihood ratio {digits(one.log_likelihood_ratio, 2)}). It is less likely because its coefficients, or values of the preset beside it, would be less usual.{separating}"
-            )
+    for name in [effect.name for effect in findings.added]:
+        alike = [one for one in findings.confounders if one.only_by_priors and one.effect == name]
+        if not alike:
+            continue
+        others = [
+            f"{titles[one.confounder]} (log-likelihood ratio {digits(one.log_likelihood_ratio, 2)})" for one in alike
+        ]
+        apart = max(alike, key=lambda one: one.separation if one.separating_run else 0.0)
+        separating = (
+            f" A run with {apart.separating_run} would separate it from {titles[apart.confounder]} by {apart.separation:.1f} times the noise."
+            if apart.separating_run and apart.separation >= LEAST_SEPARATION
+            else ""
+        )
+        yield (
+            f"Mind: the fit runs alone hardly tell {titles[name]} from {and_listed(others)}, with which in its place the model leaves as little. "
+            f"It is named because its size, and the values of the preset beside it, are the more usual ones.{separating}"
+        )
 
 
 def of_the_preset(findings: Findings, effect: EffectFinding) -> str:
