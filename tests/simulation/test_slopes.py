@@ -179,4 +179,4 @@ def test_with_each_effect_reverse_mode_agrees_with_forward_mode(effect: str) -> 
     middle = float(get_parameters(full, ["convection_coefficient"])[0])
     axes = sampled(5, convection_coefficient=(0.7 * middle, 1.3 * middle), seed=3)
     inputs = {channel: jnp.asarray(command)}
-    _same_as_forward(full, inputs, axes, (Mean("reading"), Mean("temperature")), tuple(table), dt=0.05)
+    _same_as_forward(full, inputs, axes, (Mean("reading"), Mean("temperature")), tuple(table), dt=0.05, tolerance=None)
