@@ -59,8 +59,8 @@ class AttributionConfig:
 
     # Confounders
     overlap_listed: float = 0.7  # of an effect's trace: a candidate that overlaps less hardly takes its place
-    # Log-likelihood ratio within which fit runs hardly tell two models, whatever their priors say: beyond it evidence is called very strong (Kass & Raftery 1995).
-    told_by_runs: float = 5.0
+    # Log-likelihood ratio down to which fit runs hardly tell two models: twenty to one, as for everything else that is named.
+    told_by_runs: float = 3.0
     separating_weight: float = 0.01  # from which a run that separates the two is looked for
 
     # Unknown terms

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -12,6 +11,7 @@ from smajax.attribution.findings import Confounder
 from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
+from smajax.attribution.optimum import at_optimum
 from smajax.attribution.score_test import scaled
 from smajax.attribution.traces import Traces, traces_at
 from smajax.data.experiment.record import Run
@@ -20,6 +20,7 @@ from smajax.fit.outputs_of_runs import predicted_at
 
 # Of itself: all that is left, by rounding, of a trace that other parameters make as well.
 ABSORBED = 1e-6
+NEAR = 30.0  # in log likelihood behind the model found: what a fit that the search ended may still have to come to
 
 
 def confounders(search: JointSearch, setting: Search, model: Model, runs: Sequence[Run]) -> tuple[Confounder, ...]:
@@ -29,53 +30,71 @@ def confounders(search: JointSearch, setting: Search, model: Model, runs: Sequen
     the effect.
 
     A weight is the posterior probability of the model with the confounder among `model` and all confounders of the same
-    effect: by the evidence of their fits and the prior odds of the effects. Where the runs alone do not tell the two (`told_by_runs`), but would tell
-    the model without either, a small weight comes from the priors: from what is usual of the coefficients, and of presets' values.
+    effect: by the evidence of their fits and the prior odds of the effects. Where that is small, but the runs alone hardly tell the two
+    (`told_by_runs`) and would tell the model without either, it comes from the priors, and the confounder is `only_by_priors` less likely.
     """
     own = search.joint.ordered(model.effects)
     if not own or own not in search.fitted:
         return ()
     fitted = search.fitted[own]
-    variance = search.error(fitted) ** 2
-    here = fitted.log_evidence(variance)
-    in_place = {effect: list(_in_place_of(search, own, effect)) for effect in own}
+    error = search.error(fitted)
+    here = fitted.log_evidence(error**2)
+    in_place = {effect: list(_in_place_of(search, own, effect, error)) for effect in own}
     others = {other for likened in in_place.values() for other, _ in likened}
     looked_for = search.detectable or tuple(search.joint.coefficients)  # by the search's programs
     traces = traces_at(search.joint, fitted, search.extent, (*looked_for, *others), looked_for)
     found: list[Confounder] = []
     likely: list[tuple[int, FittedModel]] = []  # (place in `found`, model with a confounder that runs may separate)
     for effect, likened in in_place.items():
-        odds = np.exp([min(one.log_evidence(variance) - here, 500.0) for _, one in likened])
+        without = search.fitted.get(search.joint.ordered([name for name in own if name != effect]))
+        odds = np.exp([min(one.log_evidence(error**2) - here, 500.0) for _, one in likened])
         for (other, one), share in zip(likened, odds / (1.0 + odds.sum()), strict=True):
             alike = _alike(search, traces, fitted, effect, other)
-            ratio = _ratio(one, fitted, variance)
-            without = search.fitted.get(search.joint.ordered([name for name in own if name != effect]))
-            gained = math.inf if without is None else _ratio(one, without, variance)
-            told = setting.config.told_by_runs
-            same = share <= setting.config.separating_weight and ratio > -told and gained > told
+            ratio = log_likelihood_ratio(one, fitted, error)
+            same = share <= setting.config.confounder_mentioned and _by_priors(setting, one, fitted, without, error)
             if same or share > setting.config.separating_weight:
                 likely.append((len(found), one))
             elif not alike > setting.config.overlap_listed:
                 continue
             found.append(Confounder(effect, other, alike, float(share), one.rms, "", float("nan"), ratio, same))
-    separated = separating_runs(setting, model, [one for _, one in likely], runs)
+    separated = separating_runs(setting, fitted, [one for _, one in likely], runs)
     for (place, _), (what, apart) in zip(likely, separated, strict=True):
         found[place] = dataclasses.replace(found[place], separating_run=what, separation=apart)
     return tuple(sorted(found, key=lambda one: -one.weight))
 
 
-def _ratio(one: FittedModel, other: FittedModel, variance: float) -> float:
-    """Log-likelihood ratio of `one` over `other` at their fits."""
-    return 0.5 * (other.squares - one.squares) / variance
+def log_likelihood_ratio(one: FittedModel, other: FittedModel, error: float) -> float:
+    """Of `one` over `other` at their fits; `error` of an independent sample, SI."""
+    return 0.5 * (other.squares - one.squares) / error**2
 
 
-def _in_place_of(search: JointSearch, own: Sequence[str], effect: str) -> Iterator[tuple[str, FittedModel]]:
-    """(other effect, fitted model) with another effect in the place of `effect`."""
+def _by_priors(
+    setting: Search, one: FittedModel, fitted: FittedModel, without: FittedModel | None, error: float
+) -> bool:
+    """Whether `one` is less likely than `fitted` by priors and not by the runs, which do tell both from the model `without` either.
+
+    What the runs say against it is little, and less than half of what makes it less likely.
+    """
+    told, ratio = setting.config.told_by_runs, log_likelihood_ratio(one, fitted, error)
+    if without is not None and not log_likelihood_ratio(one, without, error) > told:
+        return False
+    behind = fitted.log_evidence(error**2) - one.log_evidence(error**2)
+    return ratio > -told and -ratio < 0.5 * behind
+
+
+def _in_place_of(
+    search: JointSearch, own: Sequence[str], effect: str, error: float
+) -> Iterator[tuple[str, FittedModel]]:
+    """(other effect, fitted model) with another effect in the place of `effect`; at its optimum where that may make them alike.
+
+    The search ends fits that fall behind, or made them where far more was left and priors weighed more.
+    """
     rest = set(own) - {effect}
     for effects, model in search.fitted.items():
         if len(effects) == len(own) and rest < set(effects) and effect not in effects:
             (other,) = set(effects) - rest
-            yield other, model
+            near = log_likelihood_ratio(model, search.fitted[tuple(own)], error) > -NEAR
+            yield other, at_optimum(search, model, error) if near else model
 
 
 def _alike(search: JointSearch, traces: Traces, fitted: FittedModel, effect: str, other: str) -> float:
@@ -108,7 +127,7 @@ def overlap(trace: np.ndarray, absorbing: Sequence[np.ndarray], other: Sequence[
 
 
 def separating_runs(
-    setting: Search, one: Model, others: Sequence[Model | FittedModel], runs: Sequence[Run]
+    setting: Search, one: Model | FittedModel, others: Sequence[Model | FittedModel], runs: Sequence[Run]
 ) -> list[tuple[str, float]]:
     """Of each of `others`: (the candidate run on which it differs most from `one`, rms difference over the noise).
 

@@ -152,7 +152,7 @@ class Confounder:
     separation: float  # by how many times the noise, rms
     # Of the model that has it instead over the one that was found, by the runs alone: without priors and prior odds.
     log_likelihood_ratio: float = float("nan")
-    only_by_priors: bool = False  # the runs alone do not tell the two
+    only_by_priors: bool = False  # the runs alone hardly tell the two, or prefer it
 
 
 @dataclass(frozen=True)

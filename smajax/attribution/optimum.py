@@ -66,6 +66,14 @@ def leaves_noise(setting: Search, model: FittedModel) -> bool:
 
 
 def refined(search: JointSearch, model: FittedModel, error: float) -> FittedModel:
+    """`at_optimum`, among the models that the search has fitted."""
+    best = at_optimum(search, model, error)
+    if best is not model:
+        search.fitted[model.effects] = best
+    return best
+
+
+def at_optimum(search: JointSearch, model: FittedModel, error: float) -> FittedModel:
     """A fitted model taken to its optimum, which standard errors need; `error` of an independent sample, SI."""
     joint = dataclasses.replace(search.joint, width_factors=model.width_factors)
     problem, index = joint.restricted(model.effects)
@@ -76,10 +84,7 @@ def refined(search: JointSearch, model: FittedModel, error: float) -> FittedMode
     values = np.array(model.values)
     values[index] = fit.values
     best = fitted_model(joint, model.effects, values, model.effects)
-    if not best.log_evidence(error**2) > model.log_evidence(error**2):
-        return model
-    search.fitted[model.effects] = best
-    return best
+    return best if best.log_evidence(error**2) > model.log_evidence(error**2) else model
 
 
 def final_model(search: JointSearch, setting: Search, found: FittedModel, error: float) -> Model:

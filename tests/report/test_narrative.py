@@ -276,17 +276,16 @@ def test_confounders_are_named_by_their_weight() -> None:
 def test_a_confounder_that_priors_alone_tell_is_minded_with_the_run_that_separates_it() -> None:
     one = Confounder("latent_heat", "radiation", 0.81, 1e-5, 1e-4, "a ramp", 4.2, -1.21, only_by_priors=True)
     said = _summary(confounders=(one,))
-    assert (
-        "hardly tell latent heat of transformation from radiation to the surroundings (log-likelihood ratio -1.2), with"
-        in said
-    )
-    assert "A run with a ramp would separate it from radiation to the surroundings by 4.2 times the noise." in said
-    assert "separate it" not in _summary(confounders=(dataclasses.replace(one, separation=0.2),))
+    other = "radiation to the surroundings in its place (log-likelihood ratio -1.2)"
+    assert f"hardly tell latent heat of transformation from {other}" in said
+    assert "A run with a ramp would tell radiation to the surroundings by 4.2 times the noise." in said
+    assert "would tell" not in _summary(confounders=(dataclasses.replace(one, separation=0.2),))
     both = _summary(confounders=(one, dataclasses.replace(one, confounder="sensor_lag", separation=5.0)))
     assert both.count("Mind: the fit runs alone") == 1
-    assert "would separate it from" in both
-    plain = dataclasses.replace(one, only_by_priors=False)
-    assert "alone hardly tell" not in _summary(confounders=(plain,))
+    assert "by 5.0 times the noise" in both
+    better = _summary(confounders=(dataclasses.replace(one, log_likelihood_ratio=8.0),))
+    assert "alone prefer radiation to the surroundings in its place (log-likelihood ratio 8) to latent" in better
+    assert "the fit runs alone" not in _summary(confounders=(dataclasses.replace(one, only_by_priors=False),))
 
 
 def nothing_added() -> Findings:

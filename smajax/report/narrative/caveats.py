@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from smajax.attribution.findings import (
+    Confounder,
     EffectFinding,
     Findings,
     ParameterFinding,
@@ -211,25 +212,29 @@ def of_priors_left(findings: Findings) -> Iterator[str]:
 
 
 def of_what_priors_alone_tell(findings: Findings) -> Iterator[str]:
-    """Other effects that leave as little in the place of one that was added, and are only less usual."""
-    titles = {effect.name: effect.title for effect in findings.effects}
+    """Other effects that leave as little in the place of one that was added, or less, and are less likely by their priors alone."""
+    titles, told = {effect.name: effect.title for effect in findings.effects}, findings.config.told_by_runs
     for name in [effect.name for effect in findings.added]:
-        alike = [one for one in findings.confounders if one.only_by_priors and one.effect == name]
-        if not alike:
-            continue
-        others = [
-            f"{titles[one.confounder]} (log-likelihood ratio {digits(one.log_likelihood_ratio, 2)})" for one in alike
-        ]
-        apart = max(alike, key=lambda one: one.separation if one.separating_run else 0.0)
-        separating = (
-            f" A run with {apart.separating_run} would separate it from {titles[apart.confounder]} by {apart.separation:.1f} times the noise."
-            if apart.separating_run and apart.separation >= LEAST_SEPARATION
-            else ""
-        )
-        yield (
-            f"Mind: the fit runs alone hardly tell {titles[name]} from {and_listed(others)}, with which in its place the model leaves as little. "
-            f"It is named because its size, and the values of the preset beside it, are the more usual ones.{separating}"
-        )
+        own = [one for one in findings.confounders if one.only_by_priors and one.effect == name]
+        better = [one for one in own if one.log_likelihood_ratio > told]
+        alike = [one for one in own if one not in better]
+        for some, words in ((better, "prefer {others} to {one}"), (alike, "hardly tell {one} from {others}")):
+            if not some:
+                continue
+            others = [
+                f"{titles[one.confounder]} in its place (log-likelihood ratio {digits(one.log_likelihood_ratio, 2)})"
+                for one in some
+            ]
+            said = words.format(one=titles[name], others=and_listed(others))
+            yield f"Mind: the fit runs alone {said}. It is named by what was known before them: prior odds, usual sizes of coefficients, the preset's values.{_separated(some, titles)}"
+
+
+def _separated(some: Sequence[Confounder], titles: Mapping[str, str]) -> str:
+    """The run that separates one of these confounders most, if it is worth doing."""
+    most = max(some, key=lambda one: one.separation if one.separating_run else 0.0)
+    if not most.separating_run or most.separation < LEAST_SEPARATION:
+        return ""
+    return f" A run with {most.separating_run} would tell {titles[most.confounder]} by {most.separation:.1f} times the noise."
 
 
 def of_the_preset(findings: Findings, effect: EffectFinding) -> str:

@@ -118,7 +118,8 @@ def summary(findings: Findings) -> tuple[str, ...]:
     if (model := findings.extended_model or findings.base_model) is not None:
         sentences += range_sentences(model.values)
     sentences += caveats.of_priors_left(findings)
-    sentences += caveats.of_what_priors_alone_tell(findings)
+    if not _stand_in(findings):  # which are no names at all
+        sentences += caveats.of_what_priors_alone_tell(findings)
     unnamed = caveats.zero_so_far(findings)
     for effect in findings.added:
         if effect in unnamed or _stand_in(findings):
