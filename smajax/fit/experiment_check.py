@@ -16,6 +16,7 @@ from smajax.fit.integration import unlimited, with_integration
 from smajax.fit.outputs_of_runs import predicted_at
 from smajax.fit.packed_runs import simulate_batch, states_by_run
 from smajax.model.channels import SHOWN
+from smajax.model.load.coupon import AbstractCoupon
 
 SEED = 0  # nothing is drawn
 
@@ -29,7 +30,8 @@ class CheckedSeries:
     noise: float
     measured: np.ndarray
     simulated: np.ndarray  # at the initial guess; with the run's offset, where the file declares one
-    rmse: float  # nan without a sample
+    offset: float | None  # that zero; None where the file declares none
+    rmse: float  # nan without a sample, and where the model has no number for one
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,11 @@ class CheckedRun:
     states: Mapping[str, np.ndarray]  # temperature, martensite fraction and stress, (n,)
     series: tuple[CheckedSeries, ...]
 
+    @property
+    def has_numbers(self) -> bool:
+        """Whether the model has a number for each of its samples."""
+        return all(bool(np.isfinite(one).all()) for one in (*self.states.values(), *(s.simulated for s in self.series)))
+
 
 @dataclass(frozen=True)
 class ExperimentCheck:
@@ -52,17 +59,19 @@ class ExperimentCheck:
     source: str  # name of the experiment file
     step: float  # s, of its clock
     unknowns: Mapping[str, Unknown]  # by name
+    coupon: bool  # temperature and stress, or strain, are prescribed
     noises: Mapping[str, str]  # of each output: from where its noise is known
     warnings: tuple[str, ...]  # of the file and its logs
     checks: Checks
     runs: tuple[CheckedRun, ...]
 
-    def rmse(self, output: int = 0) -> float:
-        """Of an output on the fit runs, pooled over their samples, SI; nan without a sample."""
-        fitted = [run.series[output] for run in self.runs if run.role == "fit"]
-        misfit = np.concatenate([one.measured - one.simulated for one in fitted])
-        there = np.isfinite(misfit)
-        return float(np.sqrt(np.mean(misfit[there] ** 2))) if there.any() else float("nan")
+    def rmse(self, output: int = 0, role: str = "fit") -> float:
+        """Of an output on the runs of a role, pooled over their samples, SI; nan without a sample, and where the model has no number for one."""
+        own = [run.series[output] for run in self.runs if run.role == role]
+        misfit = np.concatenate(
+            [(one.measured - one.simulated)[np.isfinite(one.measured)] for one in own] or [np.zeros(0)]
+        )
+        return float(np.sqrt(np.mean(misfit**2))) if misfit.size else float("nan")
 
 
 def check_experiment(experiment: Experiment, progress: Progress = quiet) -> ExperimentCheck:
@@ -83,16 +92,17 @@ def check_experiment(experiment: Experiment, progress: Progress = quiet) -> Expe
         series = []
         for k, (output, measured) in enumerate(zip(experiment.outputs, run.outputs.values(), strict=True)):
             simulated, valid = readings[number * count + k, : len(run.time)], np.isfinite(measured)
-            if output.offset and valid.any():
-                simulated = simulated + float(np.mean(measured[valid] - simulated[valid]))
+            zero = float(np.mean(measured[valid] - simulated[valid])) if output.offset and valid.any() else None
+            simulated = simulated + (zero or 0.0)
             rmse = float(np.sqrt(np.mean((measured[valid] - simulated[valid]) ** 2))) if valid.any() else np.nan
-            series.append(CheckedSeries(output.name, output.unit, output.noise_sigma, measured, simulated, rmse))
+            series.append(CheckedSeries(output.name, output.unit, output.noise_sigma, measured, simulated, zero, rmse))
         runs.append(CheckedRun(run.name, run.role, run.time, run.inputs, states[run.name], tuple(series)))
     return ExperimentCheck(
         title=experiment.title,
         source=experiment.path.name,
         step=experiment.step,
         unknowns=setup.unknowns,
+        coupon=isinstance(problem.system.load, AbstractCoupon),
         noises={output.name: output.noise_how for output in experiment.outputs},
         warnings=experiment.warnings,
         checks=checks,

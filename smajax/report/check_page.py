@@ -13,7 +13,7 @@ from smajax.core.display_units import display, label
 from smajax.core.files import json_text, replace
 from smajax.core.provenance import made_with
 from smajax.fit.experiment_check import CheckedRun, CheckedSeries, ExperimentCheck
-from smajax.report.check_words import UNKNOWNS_HEAD, answer, conclusions, run_rows, unknown_rows
+from smajax.report.check_words import UNKNOWNS_HEAD, answer, conclusions, run_rows, unknown_rows, warnings
 from smajax.report.next_steps import Step, section
 from smajax.report.plain_page import bullets, folded, headline, table, whole
 from smajax.report.run_plots import measured_line, output_alone, output_panel, residual_panel, run_plot
@@ -45,7 +45,7 @@ def record(found: ExperimentCheck, command: str = "") -> dict[str, Any]:
         "title": found.title,
         "experiment": found.source,
         "conclusions": [answer(found), *conclusions(found)],
-        "warnings": list(found.warnings),
+        "warnings": warnings(found),
         "step": found.step,
         "unknowns": {
             name: {"unit": one.unit, "start": one.start, "low": one.low, "high": one.high, "per_run": one.per_run}
@@ -74,6 +74,7 @@ def _run(run: CheckedRun) -> dict[str, Any]:
             "range": span(one.measured),
             "missing": missing,
             "noise_sigma": one.noise,
+            "offset": one.offset,
             "rmse": one.rmse,
         }
 
@@ -105,7 +106,7 @@ def page(found: ExperimentCheck, command: str = "", steps: Sequence[Step] = ()) 
         bullets(conclusions(found)),
         section(steps),
         "<h2>Runs</h2>",
-        "<p class=quiet>Nothing was fitted: errors, temperatures and martensite fractions are those at the initial guess.</p>",
+        "<p class=quiet>Nothing was fitted: errors (rms), zeros and what is simulated are those at the initial guess.</p>",
         table(head, rows, range(2, len(head))),
         *folded(
             [
@@ -115,7 +116,7 @@ def page(found: ExperimentCheck, command: str = "", steps: Sequence[Step] = ()) 
             "runs",
         ),
         "<h2>Unknowns</h2>",
-        table(UNKNOWNS_HEAD, unknown_rows(found), (1, 2, 3)),
+        table(UNKNOWNS_HEAD, unknown_rows(found), (1, 2, 3)) if found.unknowns else "<p>None.</p>",
         "<h2>Provenance</h2>",
         table(["", ""], [["command", command], *map(list, made_with().items())]),
         "<p class=quiet>The same numbers: check.json.</p>",

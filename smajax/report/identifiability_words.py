@@ -113,7 +113,7 @@ def _rank_sentence(found: Identifiability, correlated: Sequence[str] | None) -> 
     if rank == unknowns:
         which = f"All {unknowns} unknowns are" if unknowns > 1 else "The one unknown is"
         later = (
-            "; how far their estimates are correlated is known at the fit"
+            "; how far their estimates are correlated, and whether a bound holds one, is known at the fit"
             if correlated is None and unknowns > 1
             else ""
         )

@@ -21,6 +21,7 @@ from smajax.core.operating_system import as_typed
 from smajax.data.experiment.draft_model import GUESSED, loads_with
 from smajax.data.model_file.actuator_model import ActuatorModel
 from smajax.data.model_file.its_experiment import experiment_of_model
+from smajax.fit.experiment_check import ExperimentCheck
 from smajax.fit.identify_result import Identified
 from smajax.model.system import System
 
@@ -144,12 +145,12 @@ def _in_python(model: Path) -> Step:
     return Step("Use it in Python", python=f"import smajax as sma; model = sma.load_model({model.as_posix()!r}).system")
 
 
-def after_check(experiment: str) -> list[Step]:
+def after_check(found: ExperimentCheck, experiment: str) -> list[Step]:
     """experiment: path of its file."""
-    return [
-        Step("Fit the unknowns", command("identify", experiment, "--out", "identified")),
-        Step("Find what the model lacks", command("close-loop", experiment, "--out", "report")),
-    ]
+    again = Step("After a change of the file, check it again", command("check", experiment))
+    fit = Step("Fit the unknowns", command("identify", experiment, "--out", "identified"))
+    search = Step("Find what the model lacks", command("close-loop", experiment, "--out", "report"))
+    return [*[again] * bool(found.warnings), *[fit] * bool(found.unknowns), search]
 
 
 def after_identify(result: Identified, folder: Path, experiment: str) -> list[Step]:

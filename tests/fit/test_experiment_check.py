@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -10,8 +11,8 @@ import numpy as np
 import pytest
 
 import smajax as sma
-from smajax.report.check_words import conclusions, run_rows
-from tests.helpers.small_bench import bench, log, refused, smajax
+from smajax.report.check_words import conclusions, run_rows, warnings
+from tests.helpers.small_bench import bench, log, refused, smajax, table
 
 pytestmark = pytest.mark.usefixtures("blank_pictures")
 
@@ -76,12 +77,17 @@ def test_the_command_writes_a_page_and_the_same_numbers(tmp_path: Path) -> None:
     )
     assert all(sentence in ended.out for sentence in record["conclusions"])
     assert "smajax close-loop" in page
-    # Once more, as a program asks for it; and an edited file needs the word.
+    assert ended.said.count("gives nothing of this bench") + ended.out.count("gives nothing of this bench") == 1
+    # Once more, as a program asks for it; and an edited file is checked in the place of the one before.
     again = smajax("check", path, "--out", out, "--json")
     assert json.loads(again.out)["runs"] == record["runs"]
     path.write_text(path.read_text().replace('start = "100 W', 'start = "110 W'))
-    assert "--overwrite" in refused("check", path, "--out", out)
-    assert smajax("check", path, "--out", out, "--overwrite").code == 0
+    assert (
+        json.loads(smajax("check", path, "--out", out, "--json").out)["unknowns"]["convection_coefficient"]["start"]
+        == 110.0
+    )
+    # But no other result.
+    assert "--overwrite" in refused("identify", path, "--out", out)
 
 
 def test_what_cannot_be_read_leaves_nothing(tmp_path: Path) -> None:
@@ -99,3 +105,42 @@ def test_a_file_without_unknowns_is_checked_too(tmp_path: Path) -> None:
     assert ended.code == 0, ended.said
     assert "0 unknowns to fit" in ended.out
     assert "Nothing is declared unknown" in ended.out
+
+
+def test_a_zero_of_each_run_is_taken_off_and_shown(tmp_path: Path) -> None:
+    path = bench(tmp_path, ('noise = "0.1 mm"', 'noise = "0.1 mm"\noffset = true'))
+    held = np.loadtxt(tmp_path / "b.csv", delimiter=",", skiprows=1)
+    plain = sma.check_experiment(sma.load_experiment(path))
+    table(tmp_path / "b.csv", held[:, 0], held[:, 1], held[:, 2] + 7.0)
+    moved = sma.check_experiment(sma.load_experiment(path))
+    (before,), (after,) = plain.runs[1].series, moved.runs[1].series
+    assert before.offset is not None
+    assert after.offset == pytest.approx(before.offset + 7e-3, abs=1e-6)
+    assert after.rmse == pytest.approx(before.rmse, rel=1e-4)
+    head, rows = run_rows(moved)
+    assert float(rows[1][head.index("position, zero of the run (mm)")]) == pytest.approx(1e3 * after.offset, rel=1e-2)
+    assert any("Each run's own zero is taken off." in one for one in conclusions(moved))
+
+
+def test_a_run_without_numbers_is_named_and_not_taken_for_a_wire_at_rest(tmp_path: Path) -> None:
+    found = sma.check_experiment(sma.load_experiment(bench(tmp_path)))
+    run = found.runs[0]
+    (one,) = run.series
+    gone = dataclasses.replace(one, simulated=np.where(run.time > 5.0, np.nan, one.simulated), rmse=np.nan)
+    cold = {name: np.where(run.time > 5.0, np.nan, values) for name, values in run.states.items()}
+    broken = dataclasses.replace(found, runs=(dataclasses.replace(run, series=(gone,), states=cold), found.runs[1]))
+    said = warnings(broken)
+    assert any("no number for samples of A:" in text for text in said)
+    assert not any("does not transform in A" in text for text in said)
+    assert np.isnan(broken.rmse())
+    assert not any("of the fit runs is off" in text for text in conclusions(broken))
+
+
+def test_a_load_that_no_wire_stands_is_a_warning(tmp_path: Path) -> None:
+    heavy = bench(tmp_path, ("[unknown]", '[model.parameters]\nload_mass = "75 kg"\n[unknown]'))
+    (said,) = [
+        one for one in warnings(sma.check_experiment(sma.load_experiment(heavy))) if "no wire carries more" in one
+    ]
+    assert "check the load" in said
+    usual = sma.check_experiment(sma.load_experiment(bench(tmp_path / "usual")))
+    assert not any("no wire carries more" in one for one in warnings(usual))

@@ -339,8 +339,8 @@ def test_the_checks_before_a_fit_are_messages_and_a_prior_without_use_is_a_warni
     narrated(events.append)(Result(Checks(found, unused_priors=True, held_presets=("c",), freed_later=("d",))))
     assert [type(one) for one in events] == [WarningMessage, Message, Message, Message]
     assert [one.text for one in events if isinstance(one, Message)] == [
-        "check: All 2 unknowns are identifiable from these runs (Jacobian of 500 samples, rank 2); how far their estimates are correlated is "
-        "known at the fit.",
+        "check: All 2 unknowns are identifiable from these runs (Jacobian of 500 samples, rank 2); how far their estimates are correlated, "
+        "and whether a bound holds one, is known at the fit.",
         "check: That is with d at the presets' values. The file does not give them, so the search fits them as well: what these runs then determine "
         "of each is said beside its value.",
         "check: The file does not give c: held at the values of the presets, or at the base that [priors.presets] has. `identify --presets fitted` fits them "

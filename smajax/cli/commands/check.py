@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -12,6 +13,11 @@ from smajax.cli.terminal import browse, command_line, console, resumable
 
 if TYPE_CHECKING:
     from smajax.fit.experiment_check import ExperimentCheck
+
+
+def _replaces(before: Mapping[str, Any], now: Mapping[str, Any]) -> bool:
+    """Whatever was checked before: a check takes seconds, and is made again after each change of the file."""
+    return True
 
 
 def check_command(
@@ -23,8 +29,8 @@ def check_command(
 ) -> None:
     """Read an experiment and its logs, and simulate every run at the initial guess; nothing is fitted.
 
-    Says in seconds what was read, in which units, how far the model is off where a fit begins, whether the wire transforms there, and
-    which unknowns the runs determine; draws measured and simulated runs.
+    Says in seconds what looks wrong, what was read and in which units, how far the model is off where a fit begins, whether the wire
+    transforms there, and which unknowns the runs determine; draws measured and simulated runs. An earlier check in --out is replaced.
 
     Example:  smajax check experiment.toml --open
     """
@@ -34,7 +40,7 @@ def check_command(
     from smajax.cli.progress_display import displayed
     from smajax.cli.result_folder import FolderTaken, check_path, claimed
     from smajax.core.files import json_text
-    from smajax.core.progress import Result
+    from smajax.core.progress import Stage
     from smajax.data.experiment.errors import ExperimentError
     from smajax.data.experiment.fingerprint import fingerprint
     from smajax.data.experiment.load import load_experiment
@@ -48,12 +54,12 @@ def check_command(
     try:
         with (
             resumable(),
-            claimed(out, "check", dict(fingerprint(loaded)), FILES, overwrite),
+            claimed(out, "check", dict(fingerprint(loaded)), FILES, overwrite, _replaces),
             displayed(console(), hint=False) as progress,
         ):
             # Its sentences are part of what is printed in the end.
-            found = check_experiment(loaded, lambda event: None if isinstance(event, Result) else progress(event))
-            page = write_check(found, out, command, after_check(str(experiment)))
+            found = check_experiment(loaded, lambda event: progress(event) if isinstance(event, Stage) else None)
+            page = write_check(found, out, command, after_check(found, str(experiment)))
     except (FolderTaken, ExperimentError):
         raise
     except ValueError as error:
@@ -74,7 +80,8 @@ def _print(found: ExperimentCheck) -> None:
 
     for sentence in (answer(found), *conclusions(found)):
         typer.echo(f"  {sentence}")
-    for rows in (by_columns(*run_rows(found)), [list(UNKNOWNS_HEAD), *unknown_rows(found)]):
+    unknowns = [[list(UNKNOWNS_HEAD), *unknown_rows(found)]] if found.unknowns else []
+    for rows in (by_columns(*run_rows(found)), *unknowns):
         typer.echo()
         for line in aligned(rows):
             typer.echo(f"  {line}".rstrip())

@@ -1,4 +1,4 @@
-"""Columns and units that the log of one run has otherwise than those of the others."""
+"""Columns, units and signs that the log of one run has otherwise than those of the others."""
 
 from __future__ import annotations
 
@@ -16,12 +16,15 @@ Places = tuple[Mapping[str, ChannelSection], TimeSection | None]
 def own_columns(
     path: Path, run: RunSection, channels: Mapping[str, ChannelSection], time: TimeSection | None
 ) -> Places:
-    """The channels and the time as this run's `columns` and `units` have them. Raises ExperimentError for a name that is no channel."""
+    """The channels and the time as this run's `columns`, `units` and `reversed` have them. Raises ExperimentError for a name that is no channel, or no output."""
     timed = time is not None and time.kind == "column"
     known = [*channels, *([TIME] if timed else [])]
     for key, table in (("columns", run.columns), ("units", run.units)):
         for name in table:
             check_name(path, f"runs.{run.name}.{key}.{name}", "channel", name, known)
+    outputs = [name for name, channel in channels.items() if channel.role == "output"]
+    for name in run.reversed:
+        check_name(path, f"runs.{run.name}.reversed", "output", name, outputs)
 
     def changes(name: str) -> dict[str, Any]:
         place = {"column": run.columns[name]} if name in run.columns else {}
@@ -29,6 +32,8 @@ def own_columns(
 
     def changed(name: str, channel: ChannelSection) -> ChannelSection:
         own = changes(name)
+        if name in run.reversed:
+            own["reversed"] = not channel.reversed
         return channel.model_copy(update=own | ({"variable": None} if "column" in own else {}))
 
     own_time = time.model_copy(update=changes(TIME)) if time is not None and timed else time

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
@@ -41,6 +42,7 @@ IN_COMMON = 0.9
 FOLLOWS, LEAST = 0.2, 20  # rank correlation of heat and output; samples
 AGAINST = 0.5  # rank correlation of heat and output from which on a wrong sign is a sign turned round
 LAGS = (1, 2, 4, 8)  # time constants through which an output may follow: latent heat and hysteresis hold it back
+ENOUGH = 20  # such times in a run, from which on two slow signals do not follow each other by chance
 # Whether heat makes an output rise or fall, on every moving load; the load's own sensor rises. Stress, resistance and a force that is not
 # that sensor's do one or the other by the load and the alloy.
 BY_HEAT: Mapping[str, int] = MappingProxyType({"position": 1, "angle": 1, "temperature": 1, "strain": -1})
@@ -108,13 +110,15 @@ def _heating_warnings(runs: Sequence[ReadRun], scale: Scale, heats: Sequence[str
     return []
 
 
-def _stroke_warnings(runs: Sequence[ReadRun], scale: Scale) -> list[str]:
-    """A movement that no wire of this length makes."""
-    ends = _extremes(runs, "position")
-    if ends is None:
+def _stroke_warnings(runs: Sequence[ReadRun], scale: Scale, offset: Collection[str]) -> list[str]:
+    """A movement that no wire of this length makes: over all runs, or over each where a sensor has another zero in each."""
+    apart = [[read] for read in runs] if "position" in offset else [runs]
+    ends = [found for some in apart if (found := _extremes(some, "position")) is not None]
+    if not ends:
         return []
-    share = (ends[1] - ends[0]) / scale.wire_length
-    message = f"the output 'position' moves by {ends[1] - ends[0]:.3g} m, {share:.3g} times the wire's length of {scale.wire_length:.3g} m"
+    moved = max(high - low for low, high in ends)
+    share = moved / scale.wire_length
+    message = f"the output 'position' moves by {moved:.3g} m, {share:.3g} times the wire's length of {scale.wire_length:.3g} m"
     if share > LARGEST_STROKE:
         return [f"{message}; is it in mm, or is `wire_length` another?"]
     if 0.0 < share < SMALLEST_STROKE:
@@ -154,14 +158,33 @@ def _exchange_warnings(runs: Sequence[ReadRun], heats: Sequence[str]) -> list[st
     return []
 
 
+@dataclass(frozen=True)
+class _Following:
+    """How the output of a run follows the heat: rank correlations by `LAGS`."""
+
+    run: str
+    by_lag: Array
+    many: Array  # whether the run has `ENOUGH` times that lag; of the shortest always
+
+    @property
+    def sign(self) -> float:
+        """The largest of the correlations."""
+        return float(max(self.by_lag, key=abs))
+
+    @property
+    def told(self) -> float:
+        """The size of the largest by a lag that the run has many of."""
+        return float(np.abs(self.by_lag[self.many]).max())
+
+
 def _following(
     runs: Sequence[ReadRun], scale: Scale, heats: Sequence[str], step: float
-) -> Mapping[str, Sequence[Array]]:
-    """Output -> rank correlations of heat and output, by `LAGS`, in each run that tells them.
+) -> Mapping[str, Sequence[_Following]]:
+    """Output -> how it follows the heat in each run that tells it.
 
     Heat is the power through some time constants of the wire; what follows it rises and falls with it, by whatever curve.
     """
-    following: dict[str, Sequence[Array]] = {}
+    following: dict[str, Sequence[_Following]] = {}
     for name in runs[0].run.outputs:
         result = []
         for read in runs:
@@ -173,19 +196,21 @@ def _following(
             power = scale.warming(given)
             warm = [lagging(power, step, lag * scale.time_constant)[there] for lag in LAGS]
             if np.ptp(warm[0]) > 0.0:
-                result.append(np.asarray([scipy.stats.spearmanr(one, output[there]).statistic for one in warm]))
+                by_lag = np.asarray([scipy.stats.spearmanr(one, output[there]).statistic for one in warm])
+                lasts = there.sum() * step / (scale.time_constant * np.asarray(LAGS))
+                result.append(_Following(read.run.name, by_lag, (lasts >= ENOUGH) | (np.arange(len(LAGS)) == 0)))
         if result:
             following[name] = result
     return following
 
 
-def _unrelated_warnings(following: Mapping[str, Sequence[Array]]) -> list[str]:
+def _unrelated_warnings(following: Mapping[str, Sequence[_Following]]) -> list[str]:
     """Outputs that do not follow the heat by any lag: files that do not belong together, or samples out of order.
 
     By any, because the wire's time constant may be a preset's that is ten times thinner.
     """
     for name, result in following.items():
-        median = float(np.median([np.max(np.abs(by_lag)) for by_lag in result]))
+        median = float(np.median([one.told for one in result]))
         if median < FOLLOWS:
             return [
                 f"the output {name!r} hardly follows the heat (rank correlation {median:.2f} in the median run): do "
@@ -194,17 +219,28 @@ def _unrelated_warnings(following: Mapping[str, Sequence[Array]]) -> list[str]:
     return []
 
 
-def _reversed_warnings(following: Mapping[str, Sequence[Array]], own: str) -> list[str]:
-    """Outputs that move against the heat where the model's move with it, or the other way round. own: that of the load's sensor."""
+def _reversed_warnings(following: Mapping[str, Sequence[_Following]], own: str) -> list[str]:
+    """Outputs that move against the heat where the model's move with it, or the other way round, in all runs or in some. own: that of the load's sensor."""
     message, signs = [], {**BY_HEAT, own: 1}
     for name, result in following.items():
-        median = float(np.median([max(by_lag, key=abs) for by_lag in result]))
-        if name in signs and signs[name] * median < -AGAINST:
+        if name not in signs:
+            continue
+        median = float(np.median([one.sign for one in result]))
+        way = "rises" if signs[name] > 0 else "falls"
+        if signs[name] * median < -AGAINST:
             message.append(
                 f"the output {name!r} moves against the model (rank correlation with the heat {median:.2f} in the median run; "
-                f"the model's {'rises' if signs[name] > 0 else 'falls'} with it): is the sensor's sign reversed? Set "
+                f"the model's {way} with it): is the sensor's sign reversed? Set "
                 f"reversed = true under [channels.{name}], or take it out where it is set"
             )
+            continue
+        # One of the other sign hardly shows in the median, and no fit makes up for it.
+        message += [
+            f"run {one.run!r}: the output {name!r} moves against the model (rank correlation with the heat {one.sign:.2f}; the model's {way} with it, as "
+            f"in the median run): was the sensor mounted the other way round? Set reversed = [{name!r}] in that run, or take it out where it is set"
+            for one in result
+            if signs[name] * median > FOLLOWS and signs[name] * one.sign < -AGAINST
+        ]
     return message
 
 
@@ -230,7 +266,7 @@ def magnitude_warnings(
     """All of them. scale: of the model at its known values and starts; heats: the inputs that heat the wire; offset: outputs with a zero of their own in each run."""
     result = [*_size_warnings(runs), *_exchange_warnings(runs, heats)]
     if scale is not None:
-        result += [*_heating_warnings(runs, scale, heats), *_stroke_warnings(runs, scale)]
+        result += [*_heating_warnings(runs, scale, heats), *_stroke_warnings(runs, scale, offset)]
         result += quantity_warnings(runs, scale, heats, step, offset)
         if heats:
             following = _following(runs, scale, heats, step)

@@ -163,6 +163,9 @@ class RunSection(Section):
     units: dict[str, str] = Field(
         default={}, description="a table of channel (or time) = 'unit', where this run's log has another"
     )
+    reversed: list[str] = Field(
+        default=[], description="a list of outputs whose sensor was mounted the other way round in this run alone"
+    )
     start: Quantity | None = Field(
         default=None, description="a time in the log, 'number unit', before which it is left out"
     )
