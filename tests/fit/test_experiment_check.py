@@ -115,6 +115,7 @@ def test_a_zero_of_each_run_is_taken_off_and_shown(tmp_path: Path) -> None:
     moved = sma.check_experiment(sma.load_experiment(path))
     (before,), (after,) = plain.runs[1].series, moved.runs[1].series
     assert before.offset is not None
+    assert after.offset is not None
     assert after.offset == pytest.approx(before.offset + 7e-3, abs=1e-6)
     assert after.rmse == pytest.approx(before.rmse, rel=1e-4)
     head, rows = run_rows(moved)
