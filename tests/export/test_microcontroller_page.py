@@ -9,11 +9,10 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from smajax.cli.main import app
 from smajax.control.gains_file import Gains, write_gains
 from smajax.model.presets import build
+from tests.helpers.small_bench import smajax
 
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "to-a-microcontroller.md"
 TEXT = PAGE.read_text(encoding="utf-8")
@@ -36,8 +35,8 @@ def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
 
 def _smajax(line: str) -> None:
     """A command of the page, here."""
-    told = CliRunner().invoke(app, shlex.split(line)[1:])
-    assert told.exit_code == 0, told.output
+    told = smajax(*shlex.split(line)[1:])
+    assert told.code == 0, told.said
 
 
 def _compiled() -> None:
