@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import sys
+import textwrap
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
 
 INTERRUPTED = 130
 REPEAT = 1.0  # s after which an unanswered Ctrl-C is repeated
+NARROWEST = 40  # columns: a narrower terminal breaks lines itself
 RETRY = 0.02  # s, where it came at a moment at which no exception can be raised
 CALLBACKS = ("_xla_gc_callback",)  # an exception in them is lost
 IMPORTING = ("<frozen importlib._bootstrap>", "_find_and_load")  # file and function that an import statement runs
@@ -42,6 +45,26 @@ def console() -> Console:
     from rich.console import Console
 
     return Console(stderr=True)
+
+
+def say(sentence: str, err: bool = False) -> None:
+    """A sentence of a result, indented; on a terminal broken between words, and into a file or a pipe in one line."""
+    import typer
+
+    stream = sys.stderr if err else sys.stdout
+    if stream.isatty():
+        width = max(shutil.get_terminal_size().columns, NARROWEST)
+        sentence = textwrap.fill(
+            sentence,
+            width,
+            initial_indent="  ",
+            subsequent_indent="    ",
+            break_long_words=False,
+            break_on_hyphens=False,
+        )
+        typer.echo(sentence, err=err)
+    else:
+        typer.echo(f"  {sentence}", err=err)
 
 
 def browse(page: Path) -> None:

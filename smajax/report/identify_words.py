@@ -23,6 +23,7 @@ from smajax.report.range_words import range_sentences
 FAR = 2.0  # standard deviations of what was known before, from which on an estimate contradicts it
 NAMED = 3  # parameters of a headline
 HELD = 4  # names of held values in a sentence
+WORSE = 1.5  # times the fit runs' error, from which on a held-out run is said to be off
 OFF = 1.25  # ratio of residual to noise that is worth a sentence
 LACKING = 3.0  # noises, from which an autocorrelated residual is the model's and not single samples'
 
@@ -93,6 +94,7 @@ def conclusions(result: Identified) -> list[str]:
         *_determined(result),
         ended_sentence(result.ended),
         *(_error(result, k) for k in range(len(result.outputs))),
+        *_worse_held_out(result),
     ]
     larger = [one for one in result.outputs if one.noise_before and one.noise_sigma > OFF * one.noise_before]
     given = [one.noise_before is None for one in result.outputs]
@@ -238,6 +240,21 @@ def _error(result: Identified, output: int) -> str:
     if one.noise_before is not None:
         noise += f" (its differences show {digits(unit.of(one.noise_before), 3)} {unit.unit})".replace(" )", ")")
     return f"{whose}: {errors}; {noise}.".replace(" ,", ",")
+
+
+def _worse_held_out(result: Identified) -> list[str]:
+    """That held-out runs are off by far more than those of the fit, with the run that is most."""
+    fitted = rms_by_role(result, 0).get("fit", np.nan)
+    held_out = [run for run in result.runs if run.role == "held-out" and np.isfinite(run.rmse)]
+    if not held_out or not fitted > 0.0:
+        return []
+    worst = max(held_out, key=lambda run: run.rmse)
+    if not worst.rmse > WORSE * fitted:
+        return []
+    return [
+        f"{worst.name}, which was held out, is off by {digits(worst.rmse / fitted, 2)} times the error of the fit runs: the model misses what shows there, or "
+        "something was otherwise in that run."
+    ]
 
 
 def estimate_rows(result: Identified) -> list[list[str]]:

@@ -161,6 +161,19 @@ def test_another_loss_is_not_advised_where_the_model_lacks_something(found: Iden
         assert any("Huber" in sentence for sentence in said) == advised
 
 
+def test_a_held_out_run_that_is_off_by_far_more_than_the_fit_is_said_to_be(found: Identified) -> None:
+    def said(ratio: float) -> list[str]:
+        fitted = [run for run in found.runs if run.role == "fit"]
+        error = float(np.sqrt(np.mean(np.square([run.rmse for run in fitted]))))
+        series = dataclasses.replace(fitted[0].series[0], rmse=ratio * error)
+        apart = dataclasses.replace(fitted[0], name="apart", role="held-out", series=(series,))
+        return [one for one in conclusions(dataclasses.replace(found, runs=(*fitted, apart))) if "apart" in one]
+
+    (off,) = said(2.4)
+    assert off.startswith("apart, which was held out, is off by 2.4 times the error of the fit runs")
+    assert said(1.4) == []
+
+
 def test_huber_weights_fall_as_one_over_the_distance() -> None:
     misfit, mask = np.concatenate([np.linspace(-1.0, 1.0, 201), [50.0, 9.0]])[None], np.ones((1, 203))
     mask[0, -1] = 0.0

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from smajax.cli.options import Json, Open, Overwrite
-from smajax.cli.terminal import browse, command_line, console, resumable
+from smajax.cli.terminal import browse, command_line, console, resumable, say
 
 if TYPE_CHECKING:
     from smajax.fit.experiment_check import ExperimentCheck
@@ -79,7 +79,7 @@ def _print(found: ExperimentCheck) -> None:
     from smajax.report.check_words import UNKNOWNS_HEAD, answer, by_columns, conclusions, run_rows, unknown_rows
 
     for sentence in (answer(found), *conclusions(found)):
-        typer.echo(f"  {sentence}")
+        say(sentence)
     unknowns = [[list(UNKNOWNS_HEAD), *unknown_rows(found)]] if found.unknowns else []
     for rows in (by_columns(*run_rows(found)), *unknowns):
         typer.echo()

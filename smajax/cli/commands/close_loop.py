@@ -13,7 +13,7 @@ import typer
 
 from smajax.cli import completion
 from smajax.cli.options import FITS, UNMET, Json, Open, Overwrite, quantity
-from smajax.cli.terminal import browse, console, resumable
+from smajax.cli.terminal import browse, console, resumable, say
 
 if TYPE_CHECKING:
     from smajax.attribution.findings import Findings
@@ -92,7 +92,7 @@ def print_findings(findings: Findings, page: Path) -> None:
 def _print_answer(title: str, verdict: str, summary: Sequence[str], page: Path) -> None:
     typer.echo(f"\n{title}\nVerdict: {verdict}")
     for sentence in summary:
-        typer.echo(f"  {sentence}")
+        say(sentence)
     typer.echo(f"Report: {page.resolve()}")
 
 
@@ -158,7 +158,7 @@ def tune_on_models(
     except (KeyError, ValueError) as error:
         raise typer.BadParameter(str(error.args[0]), param_hint="--tune") from None
     for sentence in conclusions(result):
-        typer.echo(f"  {sentence}", err=True)
+        say(sentence, err=True)
     return write_comparison(result, out, command)
 
 

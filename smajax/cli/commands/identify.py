@@ -12,7 +12,7 @@ import typer
 
 from smajax.cli import completion
 from smajax.cli.options import FITS, Json, Open, Overwrite, within
-from smajax.cli.terminal import browse, console, resumable
+from smajax.cli.terminal import browse, console, resumable, say
 
 if TYPE_CHECKING:
     from smajax.fit.identify_result import Identified
@@ -144,7 +144,7 @@ def _print(identified: Identified) -> None:
 
     typer.echo(f"\n{identified.title or identified.experiment}")
     for sentence in [answer(identified), *conclusions(identified), *weak_combinations(identified.directions)]:
-        typer.echo(f"  {sentence}")
+        say(sentence)
     rows = estimate_rows(identified)
     width = max(28, *(len(row[0]) for row in rows))
     for row in rows:

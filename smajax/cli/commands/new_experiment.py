@@ -12,6 +12,7 @@ import typer
 
 from smajax.cli import completion
 from smajax.cli.options import UNMET, Decimal, Json, quantity, texts
+from smajax.cli.terminal import say
 
 if TYPE_CHECKING:
     from smajax.cli.draft_file import DraftFile
@@ -162,9 +163,9 @@ def _print(messages: Sequence[str], loaded: DraftFile, out: Path, ranked: bool) 
     from smajax.report.preset_words import NO_NUMBER, NOT_LOADED, sentence
 
     for line in messages:
-        typer.echo(f"  {line}")
+        say(line)
     for line in loaded.warnings:
-        typer.echo(f"  warning: {line}")
+        say(f"warning: {line}")
     if loaded.reason:
         typer.echo(f"It cannot be loaded yet: {loaded.reason}")
     if ranked:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from smajax.cli.options import Decimal, Json, Open, Overwrite, texts
-from smajax.cli.terminal import browse, command_line, console, resumable
+from smajax.cli.terminal import browse, command_line, console, resumable, say
 
 if TYPE_CHECKING:
     from smajax.fit.prediction import Prediction
@@ -89,7 +89,7 @@ def _print(result: Prediction) -> None:
     from smajax.report.predict_words import HEAD, band_sentence, conclusions, run_rows
 
     for sentence in (*conclusions(result), band_sentence(result)):
-        typer.echo(f"  {sentence}")
+        say(sentence)
     for line in aligned([list(HEAD), *map(list, run_rows(result))]):
         typer.echo(f"  {line}")
     for sentence in result.warnings:

@@ -13,7 +13,7 @@ from smajax.cli import completion
 from smajax.cli.loop_options import Delay, Estimator, Noise, Period, Quantum
 from smajax.cli.options import Finely, Json, Open, Overwrite, quantity, texts, tolerance_of
 from smajax.cli.plant_options import LawName, OtherPlant, loaded
-from smajax.cli.terminal import browse, command_line, console, resumable
+from smajax.cli.terminal import browse, command_line, console, resumable, say
 
 if TYPE_CHECKING:
     from smajax.control.run_request import LoopRequest, RunRequest
@@ -148,15 +148,15 @@ def _print(result: RunResult, title: str) -> None:
     )
 
     typer.echo(title)
-    typer.echo(f"  {answer(result)}")
+    say(answer(result))
     for sentence in source_sentences(result.settings):
-        typer.echo(f"  {sentence}")
+        say(sentence)
     for row in summary_rows(result.data):
         typer.echo(f"  {row[0]:<28} {row[1]:>11} … {row[2]:<11} last {row[3]:<11} {row[4]}")
-    typer.echo(f"  {integration_sentence(integration_error(result.data))}")
+    say(integration_sentence(integration_error(result.data)))
     for sentence in measured_sentences(result):
         if sentence not in answer(result):
-            typer.echo(f"  {sentence}")
+            say(sentence)
     for row in mismatch_rows(result):
         unit, ratio = f" {row[3]}" * (row[3] != "-"), f", {row[4]}" * bool(row[4])
         typer.echo(f"  {row[0]:<28} assumed {row[1]} -> true {row[2]}{unit}{ratio}")
@@ -168,7 +168,7 @@ def _print(result: RunResult, title: str) -> None:
         for line in aligned([row[:SHOWN] for row in (head, *rows)], right=True):
             typer.echo(f"  {line}")
     if rule := merit_rule(result):
-        typer.echo(f"  {rule}")
+        say(rule)
 
 
 # More than 8 parameters and 80 lines: typer reads the options from them.
