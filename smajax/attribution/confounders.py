@@ -20,7 +20,9 @@ from smajax.fit.outputs_of_runs import predicted_at
 
 # Of itself: all that is left, by rounding, of a trace that other parameters make as well.
 ABSORBED = 1e-6
-NEAR = 30.0  # in log likelihood behind the model found: what a fit that the search ended may still have to come to
+# In log likelihood behind the model found: what a fit that the search ended may still have to come to.
+NEAR = 30.0
+REFINED = 2  # of each effect's, the likeliest
 
 
 def confounders(search: JointSearch, setting: Search, model: Model, runs: Sequence[Run]) -> tuple[Confounder, ...]:
@@ -85,16 +87,24 @@ def _by_priors(
 def _in_place_of(
     search: JointSearch, own: Sequence[str], effect: str, error: float
 ) -> Iterator[tuple[str, FittedModel]]:
-    """(other effect, fitted model) with another effect in the place of `effect`; at its optimum where that may make them alike.
+    """(other effect, fitted model) with another effect in the place of `effect`, the likeliest first; at its optimum where that may make them alike.
 
     The search ends fits that fall behind, or made them where far more was left and priors weighed more.
     """
-    rest = set(own) - {effect}
-    for effects, model in search.fitted.items():
-        if len(effects) == len(own) and rest < set(effects) and effect not in effects:
-            (other,) = set(effects) - rest
-            near = log_likelihood_ratio(model, search.fitted[tuple(own)], error) > -NEAR
-            yield other, at_optimum(search, model, error) if near else model
+    rest, found = set(own) - {effect}, search.fitted[tuple(own)]
+    models = [
+        model
+        for effects, model in search.fitted.items()
+        if len(effects) == len(own) and rest < set(effects) and effect not in effects
+    ]
+    models.sort(key=lambda model: -model.log_evidence(error**2))
+    for place, model in enumerate(models):
+        (other,) = set(model.effects) - rest
+        if place < REFINED and log_likelihood_ratio(model, found, error) > -NEAR:
+            programs = [search.joint.ordered(one) for one in search.programs if set(model.effects) <= set(one)]
+            yield other, at_optimum(search, model, error, min(programs, key=len, default=None))
+        else:
+            yield other, model
 
 
 def _alike(search: JointSearch, traces: Traces, fitted: FittedModel, effect: str, other: str) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -73,17 +74,23 @@ def refined(search: JointSearch, model: FittedModel, error: float) -> FittedMode
     return best
 
 
-def at_optimum(search: JointSearch, model: FittedModel, error: float) -> FittedModel:
-    """A fitted model taken to its optimum, which standard errors need; `error` of an independent sample, SI."""
+def at_optimum(
+    search: JointSearch, model: FittedModel, error: float, program: Sequence[str] | None = None
+) -> FittedModel:
+    """A fitted model taken to its optimum, which standard errors need; `error` of an independent sample, SI.
+
+    `program`: effects of a program that computes it, these among them; None for one of its own.
+    """
+    carried = model.effects if program is None else program
     joint = dataclasses.replace(search.joint, width_factors=model.width_factors)
-    problem, index = joint.restricted(model.effects)
+    problem, index = joint.restricted(carried)
     problem = problem.with_noise(error)
     task = problem.task(model.names, joint.bounds, model.values[index])
     settings = dataclasses.replace(search.settings, stage="taking the model to its optimum")
     (fit,) = levenberg_marquardt(problem, [task], settings)
     values = np.array(model.values)
     values[index] = fit.values
-    best = fitted_model(joint, model.effects, values, model.effects)
+    best = fitted_model(joint, model.effects, values, carried)
     return best if best.log_evidence(error**2) > model.log_evidence(error**2) else model
 
 

@@ -109,7 +109,7 @@ def test_a_confounder_is_weighed_by_its_evidence() -> None:
 def test_two_effects_with_the_same_trace_are_weighed_by_their_prior_odds(monkeypatch: pytest.MonkeyPatch) -> None:
     """As likely as the other, by the prior odds of each, which the same evidence leaves as they are."""
     # The twin's parameters are those of the other: there is no fit of it.
-    monkeypatch.setattr("smajax.attribution.confounders.at_optimum", lambda search, one, error: one)
+    monkeypatch.setattr("smajax.attribution.confounders.at_optimum", lambda search, one, error, program: one)
     setting, model, runs = _setting()
     joint = JointParameters.of(setting.problem, setting.unknowns, setting.bounds, setting.candidates, setting.extent)
     search = JointSearch(joint, setting.extent, FitSettings(), NOISE)
