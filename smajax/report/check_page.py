@@ -13,7 +13,7 @@ from smajax.core.display_units import display, label
 from smajax.core.files import json_text, replace
 from smajax.core.provenance import made_with
 from smajax.fit.experiment_check import CheckedRun, CheckedSeries, ExperimentCheck
-from smajax.report.check_words import UNKNOWNS_HEAD, answer, conclusions, run_rows, unknown_rows, warnings
+from smajax.report.check_words import UNKNOWNS_HEAD, answer, at_the_guess, conclusions, run_rows, unknown_rows, warnings
 from smajax.report.next_steps import Step, section
 from smajax.report.plain_page import bullets, folded, headline, table, whole
 from smajax.report.run_plots import measured_line, output_alone, output_panel, residual_panel, run_plot
@@ -102,8 +102,9 @@ def page(found: ExperimentCheck, command: str = "", steps: Sequence[Step] = ()) 
     parts = [
         f"<h1>{html.escape(title)}</h1>",
         headline(answer(found)),
+        bullets([f"Warning: {one}" for one in warnings(found)]),
         f'<div class="{"pair" if len(first) > 1 else ""}">{"".join(series(plot, samples, dpi=COARSE) for plot in first)}</div>',
-        bullets(conclusions(found)),
+        bullets(at_the_guess(found)),
         section(steps),
         "<h2>Runs</h2>",
         "<p class=quiet>Nothing was fitted: errors (rms), zeros and what is simulated are those at the initial guess.</p>",
@@ -121,7 +122,7 @@ def page(found: ExperimentCheck, command: str = "", steps: Sequence[Step] = ()) 
         table(["", ""], [["command", command], *map(list, made_with().items())]),
         "<p class=quiet>The same numbers: check.json.</p>",
     ]
-    return whole(title, parts)
+    return whole(title, parts, "fair" if warnings(found) else "")
 
 
 def write_check(found: ExperimentCheck, folder: Path, command: str = "", steps: Sequence[Step] = ()) -> Path:

@@ -39,7 +39,12 @@ def warnings(found: ExperimentCheck) -> list[str]:
 
 def conclusions(found: ExperimentCheck) -> list[str]:
     """The warnings, the error at the initial guess, and what the runs determine."""
-    return [*(f"Warning: {one}" for one in warnings(found)), *_errors(found), *check_sentences((), found.checks)]
+    return [*(f"Warning: {one}" for one in warnings(found)), *at_the_guess(found)]
+
+
+def at_the_guess(found: ExperimentCheck) -> list[str]:
+    """The error at the initial guess, and what the runs determine there."""
+    return [*_errors(found), *check_sentences((), found.checks)]
 
 
 def _names(found: ExperimentCheck, role: str) -> list[str]:

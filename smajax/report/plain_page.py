@@ -73,8 +73,11 @@ def section_id(heading: str) -> str:
     return re.sub(r"\W+", "-", html.unescape(re.sub(r"<[^>]+>", "", heading)).lower()).strip("-")
 
 
-def whole(title: str, parts: Sequence[str]) -> str:
-    """The page of parts that are HTML already: what stands before the first `<h2>` is the answer, and each `<h2>` begins a section."""
+def whole(title: str, parts: Sequence[str], tone: str = "") -> str:
+    """The page of parts that are HTML already: what stands before the first `<h2>` is the answer, and each `<h2>` begins a section.
+
+    tone: of the answer, "good", "fair" or "poor"; "" for none.
+    """
     first, *others = re.split(r"(?=<h2>)", "".join(parts))
     contents, sections = [("answer", "Answer")], []
     for number, other in enumerate(others, start=1):
@@ -84,4 +87,8 @@ def whole(title: str, parts: Sequence[str]) -> str:
         plain = html.unescape(re.sub(r"<[^>]+>", "", words))
         contents.append((place, re.sub(r" \(.*\)$", "", plain)))  # the contents need no units
         sections.append(f'<section id="{place}">{other}</section>')
-    return framed(title, f'<header class="answer" id="answer">{first}</header>{"".join(sections)}', contents)
+    return framed(
+        title,
+        f'<header class="{" ".join(["answer", *[tone] * bool(tone)])}" id="answer">{first}</header>{"".join(sections)}',
+        contents,
+    )
