@@ -9,6 +9,7 @@ import numpy as np
 
 from smajax.attribution.findings import Confounder
 from smajax.attribution.fitted_sets import JointSearch
+from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.optimum import at_optimum
@@ -22,6 +23,7 @@ from smajax.fit.outputs_of_runs import predicted_at
 ABSORBED = 1e-6
 # In log likelihood behind the model found: what a fit that the search ended may still have to come to.
 NEAR = 30.0
+WIDE = 10.0  # times the widths of the priors: hardly any
 REFINED = 2  # of each effect's, the likeliest
 
 
@@ -52,8 +54,8 @@ def confounders(search: JointSearch, setting: Search, model: Model, runs: Sequen
         odds = np.exp([min(one.log_evidence(error**2) - here, 500.0) for _, one in likened])
         for (other, one), share in zip(likened, odds / (1.0 + odds.sum()), strict=True):
             alike = _alike(search, traces, fitted, effect, other)
-            ratio = log_likelihood_ratio(one, fitted, error)
-            same = share <= setting.config.confounder_mentioned and _by_priors(setting, one, fitted, without, error)
+            ratio = log_likelihood_ratio(search.joint, one, fitted, error)
+            same = share <= setting.config.confounder_mentioned and _by_priors(search, setting, one, fitted, without)
             if same or share > setting.config.separating_weight:
                 likely.append((len(found), one))
             elif not alike > setting.config.overlap_listed:
@@ -65,22 +67,36 @@ def confounders(search: JointSearch, setting: Search, model: Model, runs: Sequen
     return tuple(sorted(found, key=lambda one: -one.weight))
 
 
-def log_likelihood_ratio(one: FittedModel, other: FittedModel, error: float) -> float:
-    """Of `one` over `other` at their fits; `error` of an independent sample, SI."""
-    return 0.5 * (other.squares - one.squares) / error**2
+def log_likelihood_ratio(joint: JointParameters, one: FittedModel, other: FittedModel, error: float) -> float:
+    """Of `one` over `other`, each where its fit would end with priors `WIDE` times as wide; `error` of an independent sample, SI.
+
+    At the fits themselves the model whose values are less usual leaves more, for its priors hold it back: that is not what the runs say.
+    """
+    held_back = _held_back(joint, one, error) - _held_back(joint, other, error)
+    return 0.5 * (other.squares - one.squares) / error**2 + held_back
+
+
+def _held_back(joint: JointParameters, model: FittedModel, error: float) -> float:
+    """What the log likelihood of a model gains by one Gauss-Newton step to wider priors, from the optimum, where its slope is that of the priors."""
+    from_base = np.asarray([joint.deviation(name, float(model.values[joint.slots[name]])) for name in model.names])
+    slope, gram = model.precision * from_base, model.gram / error**2
+    wide = model.precision / WIDE**2
+    step = np.linalg.lstsq(gram + np.diag(wide), slope - wide * from_base)[0]  # never singular but by rounding
+    return max(0.0, float(slope @ step - 0.5 * step @ gram @ step))
 
 
 def _by_priors(
-    setting: Search, one: FittedModel, fitted: FittedModel, without: FittedModel | None, error: float
+    search: JointSearch, setting: Search, one: FittedModel, fitted: FittedModel, without: FittedModel | None
 ) -> bool:
     """Whether `one` is less likely than `fitted` by priors and not by the runs, which do tell both from the model `without` either.
 
     What the runs say against it is little, and less than half of what makes it less likely.
     """
-    told, ratio = setting.config.told_by_runs, log_likelihood_ratio(one, fitted, error)
-    if without is not None and not log_likelihood_ratio(one, without, error) > told:
+    joint, error, told = search.joint, search.error(fitted), setting.config.told_by_runs
+    if without is not None and not log_likelihood_ratio(joint, one, without, error) > told:
         return False
     behind = fitted.log_evidence(error**2) - one.log_evidence(error**2)
+    ratio = log_likelihood_ratio(joint, one, fitted, error)
     return ratio > -told and -ratio < 0.5 * behind
 
 
@@ -100,7 +116,7 @@ def _in_place_of(
     models.sort(key=lambda model: -model.log_evidence(error**2))
     for place, model in enumerate(models):
         (other,) = set(model.effects) - rest
-        if place < REFINED and log_likelihood_ratio(model, found, error) > -NEAR:
+        if place < REFINED and log_likelihood_ratio(search.joint, model, found, error) > -NEAR:
             programs = [search.joint.ordered(one) for one in search.programs if set(model.effects) <= set(one)]
             yield other, at_optimum(search, model, error, min(programs, key=len, default=None))
         else:

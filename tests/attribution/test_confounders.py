@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
+from typing import cast
 
 import jax.numpy as jnp
 import numpy as np
@@ -13,7 +15,7 @@ from smajax.attribution.confounders import confounders, log_likelihood_ratio, ov
 from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.joint_search import search_jointly
-from smajax.attribution.laplace_evidence import fitted_model
+from smajax.attribution.laplace_evidence import FittedModel, fitted_model
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.optimum import as_model, at_optimum
 from smajax.core.result_cache import ResultCache
@@ -150,7 +152,27 @@ def test_a_model_that_is_compared_is_taken_to_its_optimum_and_not_kept() -> None
     values[joint.slots["convection_coefficient"]] *= 1.01
     early = fitted_model(joint, ("latent_heat",), values, ("latent_heat",))
     best = at_optimum(search, early, NOISE)
-    assert log_likelihood_ratio(best, early, NOISE) > 1.0
+    assert log_likelihood_ratio(joint, best, early, NOISE) > 1.0
     assert not search.fitted
     again = at_optimum(search, best, NOISE)
-    assert abs(log_likelihood_ratio(again, best, NOISE)) < 0.1
+    assert abs(log_likelihood_ratio(joint, again, best, NOISE)) < 0.1
+
+
+def test_what_priors_hold_back_is_no_difference_between_models() -> None:
+    """Of two straight lines that fit alike, one with a slope far from usual: closed form of a linear model."""
+    gram, best = 4.0, 3.0  # of one coefficient in widths of its prior: least squares alone would end at `best`
+
+    def fitted(usual: float) -> FittedModel:
+        """At the mode, with a prior about `usual`, which the coefficient counts from."""
+        at = gram * (best - usual) / (gram + 1.0)
+        left = 100.0 + gram * (usual + at - best) ** 2
+        one = np.ones(1)
+        return FittedModel(
+            ("a",), at * one, ("c",), one, left, gram * np.eye(1), one, {}, 0.0, (), np.zeros(1), 1.0, 1.0
+        )
+
+    joint = cast(JointParameters, SimpleNamespace(slots={"c": 0}, deviation=lambda name, value: value))
+    far, near = fitted(0.0), fitted(3.0)
+    assert 0.5 * (near.squares - far.squares) == pytest.approx(-0.72)
+    assert log_likelihood_ratio(joint, far, near, 1.0) == pytest.approx(0.0, abs=1e-3)
+    assert log_likelihood_ratio(joint, near, near, 1.0) == 0.0
