@@ -168,7 +168,19 @@ def test_what_priors_hold_back_is_no_difference_between_models() -> None:
         left = 100.0 + gram * (usual + at - best) ** 2
         one = np.ones(1)
         return FittedModel(
-            ("a",), at * one, ("c",), one, left, gram * np.eye(1), one, {}, 0.0, (), np.zeros(1), 1.0, 1.0
+            effects=("a",),
+            values=at * one,
+            names=("c",),
+            scales=one,
+            squares=left,
+            gram=gram * np.eye(1),
+            precision=one,
+            width_factors={},
+            log_prior=0.0,
+            one_sided=(),
+            residual=np.zeros(1),
+            rms=1.0,
+            correlation=1.0,
         )
 
     joint = cast(JointParameters, SimpleNamespace(slots={"c": 0}, deviation=lambda name, value: value))
