@@ -69,27 +69,27 @@ def _determined(checks: Checks) -> Iterator[str]:
 
 
 def identifiability_sentences(found: Identifiability) -> list[str]:
-    """How many unknowns are identifiable, then what is to be said of single ones."""
+    """How many unknowns are identifiable, after those on which nothing depends, and before what is to be said of single ones."""
     if not found.unknowns:
         return ["Nothing is declared unknown: the base model is taken as it is."]
     looked, groups = found.correlated is not None, [_group(one) for one in found.correlated or ()]
-    sentences = [
+    first = [
         f"{name}: nothing in these runs depends on it; fix it or measure something else."
         for name in found.without_effect
     ]
     if found.without_effect:
-        sentences.append(
+        first.append(
             f"That holds {found.taken_at}: a wire that never transforms there shows no parameter of its transformation. Where that "
             "is unexpected, check the bench's sizes, the drive and the initial guess first."
         )
-    sentences += [
+    sentences = [
         f"{name}: the noise alone leaves more than a quarter of its range undetermined." for name in found.undetermined
     ]
     if groups and found.rank < len(found.unknowns):
         sentences += [f"{group}: fix one of them or measure runs that separate them." for group in groups]
-    elif looked and not (sentences or groups) and 1 < len(found.unknowns) == found.rank:
+    elif looked and not (first or sentences or groups) and 1 < len(found.unknowns) == found.rank:
         sentences.append("No two of them are strongly correlated.")
-    return [_rank_sentence(found, groups if looked else None), *sentences]
+    return [*first, _rank_sentence(found, groups if looked else None), *sentences]
 
 
 def _group(one: CorrelatedGroup) -> str:

@@ -41,9 +41,10 @@ def test_correlations_beside_a_combination_without_effect_have_a_line_of_their_o
     """Where the count says already that something has to be fixed, it is not repeated there."""
     pair = CorrelatedGroup(("a", "b"), 0.995)
     lines = identifiability_sentences(Identifiability(tuple("abc"), 4000, 2, ("c",), correlated=(pair,)))
-    assert lines[0].startswith("Only 2 combinations are identifiable")
-    assert lines[1] == "c: nothing in these runs depends on it; fix it or measure something else."
-    assert lines[2].startswith("That holds at the initial guess: ")
+    assert lines[0] == "c: nothing in these runs depends on it; fix it or measure something else."
+    assert lines[1].startswith("That holds at the initial guess: ")
+    # What to fix comes after what may be the cause.
+    assert lines[2].startswith("Only 2 combinations are identifiable")
     assert lines[-1] == "a and b are correlated (up to 0.995): fix one of them or measure runs that separate them."
 
 
