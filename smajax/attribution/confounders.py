@@ -60,7 +60,8 @@ def confounders(search: JointSearch, setting: Search, model: Model, runs: Sequen
                 likely.append((len(found), one))
             elif not alike > setting.config.overlap_listed:
                 continue
-            found.append(Confounder(effect, other, alike, float(share), one.rms, "", float("nan"), ratio, same))
+            more = len(one.names) - len(fitted.names)
+            found.append(Confounder(effect, other, alike, float(share), one.rms, "", float("nan"), ratio, same, more))
     separated = separating_runs(setting, fitted, [one for _, one in likely], runs)
     for (place, _), (what, apart) in zip(likely, separated, strict=True):
         found[place] = dataclasses.replace(found[place], separating_run=what, separation=apart)

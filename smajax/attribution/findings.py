@@ -153,6 +153,7 @@ class Confounder:
     # Of the model that has it instead over the one that was found, by the runs alone: without priors and prior odds.
     log_likelihood_ratio: float = float("nan")
     only_by_priors: bool = False  # the runs alone hardly tell the two, or prefer it
+    more_parameters: int = 0  # that the model has which has it instead
 
 
 @dataclass(frozen=True)

@@ -285,6 +285,8 @@ def test_a_confounder_that_priors_alone_tell_is_minded_with_the_run_that_separat
     assert "by 5.0 times the noise" in both
     better = _summary(confounders=(dataclasses.replace(one, log_likelihood_ratio=8.0),))
     assert "alone prefer radiation to the surroundings in its place (log-likelihood ratio 8) to latent" in better
+    bent = dataclasses.replace(one, log_likelihood_ratio=8.0, more_parameters=13)
+    assert "alone hardly tell" in _summary(confounders=(bent,))
     assert "the fit runs alone" not in _summary(confounders=(dataclasses.replace(one, only_by_priors=False),))
 
 

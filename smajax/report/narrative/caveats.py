@@ -216,7 +216,8 @@ def of_what_priors_alone_tell(findings: Findings) -> Iterator[str]:
     titles, told = {effect.name: effect.title for effect in findings.effects}, findings.config.told_by_runs
     for name in [effect.name for effect in findings.added]:
         own = [one for one in findings.confounders if one.only_by_priors and one.effect == name]
-        better = [one for one in own if one.log_likelihood_ratio > told]
+        # A parameter more fits better by itself (Akaike 1974).
+        better = [one for one in own if one.log_likelihood_ratio > told + max(one.more_parameters, 0)]
         alike = [one for one in own if one not in better]
         for some, words in ((better, "prefer {others} to {one}"), (alike, "hardly tell {one} from {others}")):
             if not some:
