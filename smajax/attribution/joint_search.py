@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 import numpy as np
 
 from smajax.attribution.detectable_effects import detectable
-from smajax.attribution.exclusive_effects import in_another_way, of_groups, replaceable
+from smajax.attribution.exclusive_effects import exclude_each_other, in_another_way, of_groups, replaceable
 from smajax.attribution.fitted_sets import JointRound, JointSearch
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model
 from smajax.attribution.program_fits import BegunFit
@@ -286,8 +286,28 @@ def likeliest_alone(search: JointSearch, effects: Sequence[str], found: FittedMo
     return [search.fitted[effect,] for effect in effects if (effect,) in search.fitted]
 
 
+def described_alone(search: JointSearch, found: FittedModel) -> list[FittedModel]:
+    """The base model with one effect each that describes what an effect of `found` describes (`exclude_each_other`), fitted to its end.
+
+    However far it is behind on the way: a second range of the transformation is far from linear, and a curve of it with five stand-ins came first.
+    """
+    error = search.error(found)
+    alike = [
+        name
+        for name in search.joint.coefficients
+        if name not in search.excluded and any(exclude_each_other((name, one)) for one in found.effects)
+    ]
+    _fit_alone(search, [name for name in alike if _fresh(search, (name,), error)], error, compared=False)
+    return [search.fitted[name,] for name in alike if (name,) in search.fitted]
+
+
 def _fit_alone(
-    search: JointSearch, effects: Sequence[str], error: float, most: int | None = None, least_cost: float = np.inf
+    search: JointSearch,
+    effects: Sequence[str],
+    error: float,
+    most: int | None = None,
+    least_cost: float = np.inf,
+    compared: bool = True,
 ) -> None:
     """Fit the base model with one of `effects` each, of those that the runs can show: the `most` likeliest in the linear model, None for all."""
     shown = [effect for effect in effects if effect in search.detectable]
@@ -301,7 +321,7 @@ def _fit_alone(
         return [frozenset({one}) for effect, one in places.items() if effect in shown][:most]
 
     begun = _asked(search, search.fitted[()], error, alone, shown, most).begun
-    fit_side_by_side(search, begun, error, _stage(search, len(search.rounds)), least_cost=least_cost)
+    fit_side_by_side(search, begun, error, _stage(search, len(search.rounds)), compared, least_cost)
 
 
 def _asked(

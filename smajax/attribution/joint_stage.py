@@ -19,6 +19,7 @@ from smajax.attribution.freed_presets import freed_at_the_base, freed_by_a_step,
 from smajax.attribution.input_of_run import FAR_LESS
 from smajax.attribution.joint_search import (
     MANY,
+    described_alone,
     fitted_alone,
     likeliest_alone,
     search_jointly,
@@ -198,7 +199,10 @@ class _Stage:
     def _one_of_all(self, search: JointSearch, found: FittedModel) -> FittedModel | None:
         """The base model with one effect that is likelier than the many of `found`."""
         every = [name for name in search.joint.coefficients if name not in search.excluded]
-        likelier = self._likelier(search, found, likeliest_alone(search, every, found))
+        alone = likeliest_alone(search, every, found)
+        if not leaves_noise(self.setting, found):
+            alone += described_alone(search, found)
+        likelier = self._likelier(search, found, alone)
         return likelier[0] if likelier else None
 
     def _asked(self, search: JointSearch) -> AskedFor:
