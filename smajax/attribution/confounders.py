@@ -14,6 +14,7 @@ from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.optimum import at_optimum
 from smajax.attribution.score_test import scaled
+from smajax.attribution.side_by_side import smallest_program
 from smajax.attribution.traces import Traces, traces_at
 from smajax.data.experiment.record import Run
 from smajax.fit.design import candidate_problem
@@ -40,7 +41,7 @@ def confounders(search: JointSearch, setting: Search, model: Model, runs: Sequen
     own = search.joint.ordered(model.effects)
     if not own or own not in search.fitted:
         return ()
-    fitted = search.fitted[own]
+    fitted, config = search.fitted[own], setting.config
     error = search.error(fitted)
     here = fitted.log_evidence(error**2)
     in_place = {effect: list(_in_place_of(search, own, effect, error)) for effect in own}
@@ -55,10 +56,12 @@ def confounders(search: JointSearch, setting: Search, model: Model, runs: Sequen
         for (other, one), share in zip(likened, odds / (1.0 + odds.sum()), strict=True):
             alike = _alike(search, traces, fitted, effect, other)
             ratio = log_likelihood_ratio(search.joint, one, fitted, error)
-            same = share <= setting.config.confounder_mentioned and _by_priors(search, setting, one, fitted, without)
-            if same or share > setting.config.separating_weight:
+            same = share <= config.confounder_mentioned and _by_priors(
+                search, config.told_by_runs, ratio, one, fitted, without
+            )
+            if same or share > config.separating_weight:
                 likely.append((len(found), one))
-            elif not alike > setting.config.overlap_listed:
+            elif not alike > config.overlap_listed:
                 continue
             more = len(one.names) - len(fitted.names)
             found.append(Confounder(effect, other, alike, float(share), one.rms, "", float("nan"), ratio, same, more))
@@ -87,17 +90,16 @@ def _held_back(joint: JointParameters, model: FittedModel, error: float) -> floa
 
 
 def _by_priors(
-    search: JointSearch, setting: Search, one: FittedModel, fitted: FittedModel, without: FittedModel | None
+    search: JointSearch, told: float, ratio: float, one: FittedModel, fitted: FittedModel, without: FittedModel | None
 ) -> bool:
     """Whether `one` is less likely than `fitted` by priors and not by the runs, which do tell both from the model `without` either.
 
-    What the runs say against it is little, and less than half of what makes it less likely.
+    What the runs say against it is little, and less than half of what makes it less likely. `ratio`: of `one` over `fitted`; `told`: by which runs tell two.
     """
-    joint, error, told = search.joint, search.error(fitted), setting.config.told_by_runs
-    if without is not None and not log_likelihood_ratio(joint, one, without, error) > told:
+    error = search.error(fitted)
+    if without is not None and not log_likelihood_ratio(search.joint, one, without, error) > told:
         return False
     behind = fitted.log_evidence(error**2) - one.log_evidence(error**2)
-    ratio = log_likelihood_ratio(joint, one, fitted, error)
     return ratio > -told and -ratio < 0.5 * behind
 
 
@@ -118,8 +120,7 @@ def _in_place_of(
     for place, model in enumerate(models):
         (other,) = set(model.effects) - rest
         if place < REFINED and log_likelihood_ratio(search.joint, model, found, error) > -NEAR:
-            programs = [search.joint.ordered(one) for one in search.programs if set(model.effects) <= set(one)]
-            yield other, at_optimum(search, model, error, min(programs, key=len, default=None))
+            yield other, at_optimum(search, model, error, smallest_program(search, model.effects))
         else:
             yield other, model
 

@@ -28,6 +28,7 @@ from smajax.core.parameters import parameter_values
 from smajax.data.experiment.record import Experiment, Output, Run
 from smajax.fit.integration import unlimited
 from smajax.fit.packed_runs import RunBatch, pack, simulate_with_outputs, states_by_run
+from smajax.fit.zero_of_run import with_zero
 from smajax.model.channels import SHOWN
 from smajax.model.types import Trajectory
 
@@ -198,14 +199,9 @@ def _run_finding(
 
 
 def _beside_models(output: Output, measured: np.ndarray, before: np.ndarray, after: np.ndarray) -> BesideModels:
-    there, n = np.isfinite(measured), len(measured)
-
-    def beside(reading: np.ndarray) -> tuple[np.ndarray, float, float]:
-        offset = float(np.mean((measured - reading)[there])) if output.offset and there.any() else 0.0
-        left = (measured - (reading + offset))[there]
-        return reading + offset, offset, float(np.sqrt(np.mean(left**2))) if there.any() else float("nan")
-
-    (first, zero, error), (final, zero_after, error_after) = beside(before[:n]), beside(after[:n])
+    (first, zero, error), (final, zero_after, error_after) = (
+        with_zero(measured, reading[: len(measured)], output.offset) for reading in (before, after)
+    )
     return BesideModels(
         measured=measured,
         before=first,

@@ -273,7 +273,7 @@ def fitted_alone(search: JointSearch, effects: Sequence[str], error: float) -> l
     """The base model with one of `effects` each, of those that the runs can show; `error` of an independent sample, SI."""
     fresh = [effect for effect in effects if (effect,) not in search.fitted]
     _fit_alone(search, fresh, error)
-    return [search.fitted[effect,] for effect in effects if (effect,) in search.fitted]
+    return _alone(search, effects)
 
 
 def likeliest_alone(search: JointSearch, effects: Sequence[str], found: FittedModel) -> list[FittedModel]:
@@ -283,7 +283,7 @@ def likeliest_alone(search: JointSearch, effects: Sequence[str], found: FittedMo
     # One effect is owed what the coefficients of many cost, and no more than a model without any.
     owed = found.cost_of_coefficients(error**2) - search.fitted[()].cost_of_coefficients(error**2)
     _fit_alone(search, fresh, error, NEIGHBOURS, found.squares / error**2 + 2.0 * max(owed, 0.0))
-    return [search.fitted[effect,] for effect in effects if (effect,) in search.fitted]
+    return _alone(search, effects)
 
 
 def described_alone(search: JointSearch, found: FittedModel) -> list[FittedModel]:
@@ -298,7 +298,12 @@ def described_alone(search: JointSearch, found: FittedModel) -> list[FittedModel
         if name not in search.excluded and any(exclude_each_other((name, one)) for one in found.effects)
     ]
     _fit_alone(search, [name for name in alike if _fresh(search, (name,), error)], error, compared=False)
-    return [search.fitted[name,] for name in alike if (name,) in search.fitted]
+    return _alone(search, alike)
+
+
+def _alone(search: JointSearch, effects: Sequence[str]) -> list[FittedModel]:
+    """The models of one of `effects` each that were fitted."""
+    return [search.fitted[effect,] for effect in effects if (effect,) in search.fitted]
 
 
 def _fit_alone(

@@ -36,7 +36,7 @@ from smajax.attribution.optimum import (
 )
 from smajax.attribution.reasons import LikelierModel, NoLikelierModel, Reason, StepDependent
 from smajax.attribution.same_as_parameters import said_by_parameters
-from smajax.attribution.side_by_side import fitted_from
+from smajax.attribution.side_by_side import fitted_from, smallest_program
 from smajax.attribution.step_size_check import gain_kept_at_half_step
 from smajax.attribution.unknown.search import AskedFor, asked_for
 from smajax.attribution.unknown.terms import UNKNOWN
@@ -180,10 +180,7 @@ class _Stage:
 
     def _without_runs(self, search: JointSearch, model: FittedModel) -> tuple[Left, ...]:
         """What is left of the others without one run, and without two."""
-        # Of the programs that are compiled the smallest; what an earlier search carried may be in the base model since.
-        programs = [search.joint.ordered(one) for one in search.programs]
-        fitting = [one for one in programs if set(model.effects) <= set(one)]
-        return left_without(self.setting, model, min(fitting, key=len, default=model.effects))
+        return left_without(self.setting, model, smallest_program(search, model.effects))
 
     def before_the_end(self, search: JointSearch, found: FittedModel) -> FittedModel | None:
         """One effect that is likelier than those of `found`, in an equation where an unknown function is likelier than these too."""
@@ -199,10 +196,9 @@ class _Stage:
     def _one_of_all(self, search: JointSearch, found: FittedModel) -> FittedModel | None:
         """The base model with one effect that is likelier than the many of `found`."""
         every = [name for name in search.joint.coefficients if name not in search.excluded]
-        alone = likeliest_alone(search, every, found)
-        if not leaves_noise(self.setting, found):
-            alone += described_alone(search, found)
-        likelier = self._likelier(search, found, alone)
+        # First those that are fitted to their end: the others are not fitted again at this error.
+        described = [] if leaves_noise(self.setting, found) else described_alone(search, found)
+        likelier = self._likelier(search, found, [*described, *likeliest_alone(search, every, found)])
         return likelier[0] if likelier else None
 
     def _asked(self, search: JointSearch) -> AskedFor:

@@ -56,6 +56,13 @@ def grouped_sets(
     return found
 
 
+def smallest_program(search: JointSearch, effects: Sequence[str]) -> tuple[str, ...]:
+    """Of the programs that are compiled the smallest that computes a set of effects; without one the set itself."""
+    # What an earlier search carried may be in the base model since.
+    programs = [search.joint.ordered(one) for one in search.programs]
+    return min((one for one in programs if set(effects) <= set(one)), key=len, default=tuple(effects))
+
+
 def fitted_from(search: JointSearch, model: FittedModel) -> FittedModel:
     """The effects of `model`, fitted with every free parameter of `search` from its values; `model` where that fit has no number."""
     return _to_its_end(search, model, search.error(model), "fitting with the values of presets free")

@@ -51,20 +51,13 @@ def say(sentence: str, err: bool = False) -> None:
     """A sentence of a result, indented; on a terminal broken between words, and into a file or a pipe in one line."""
     import typer
 
-    stream = sys.stderr if err else sys.stdout
-    if stream.isatty():
+    indented = f"  {sentence}"
+    if (sys.stderr if err else sys.stdout).isatty():
         width = max(shutil.get_terminal_size().columns, NARROWEST)
-        sentence = textwrap.fill(
-            sentence,
-            width,
-            initial_indent="  ",
-            subsequent_indent="    ",
-            break_long_words=False,
-            break_on_hyphens=False,
+        indented = textwrap.fill(
+            indented, width, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False
         )
-        typer.echo(sentence, err=err)
-    else:
-        typer.echo(f"  {sentence}", err=err)
+    typer.echo(indented, err=err)
 
 
 def browse(page: Path) -> None:

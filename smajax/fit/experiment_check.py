@@ -15,6 +15,7 @@ from smajax.fit.identify_stages import Options, check_identifiability, set_up
 from smajax.fit.integration import unlimited, with_integration
 from smajax.fit.outputs_of_runs import predicted_at
 from smajax.fit.packed_runs import simulate_batch, states_by_run
+from smajax.fit.zero_of_run import with_zero
 from smajax.model.channels import SHOWN
 from smajax.model.load.coupon import AbstractCoupon
 
@@ -91,11 +92,9 @@ def check_experiment(experiment: Experiment, progress: Progress = quiet) -> Expe
     for number, run in enumerate(experiment.runs):
         series = []
         for k, (output, measured) in enumerate(zip(experiment.outputs, run.outputs.values(), strict=True)):
-            simulated, valid = readings[number * count + k, : len(run.time)], np.isfinite(measured)
-            zero = float(np.mean(measured[valid] - simulated[valid])) if output.offset and valid.any() else None
-            simulated = simulated + (zero or 0.0)
-            rmse = float(np.sqrt(np.mean((measured[valid] - simulated[valid]) ** 2))) if valid.any() else np.nan
-            series.append(CheckedSeries(output.name, output.unit, output.noise_sigma, measured, simulated, zero, rmse))
+            simulated, zero, rmse = with_zero(measured, readings[number * count + k, : len(run.time)], output.offset)
+            own = zero if output.offset and np.isfinite(measured).any() else None
+            series.append(CheckedSeries(output.name, output.unit, output.noise_sigma, measured, simulated, own, rmse))
         runs.append(CheckedRun(run.name, run.role, run.time, run.inputs, states[run.name], tuple(series)))
     return ExperimentCheck(
         title=experiment.title,

@@ -34,6 +34,7 @@ from smajax.fit.posterior import ChainSettings, Posterior, posterior
 from smajax.fit.profile import EQUAL_COST, profiles
 from smajax.fit.starts import SCREENED
 from smajax.fit.uncertainty import Uncertainty, at_bound
+from smajax.fit.zero_of_run import with_zero
 
 SEED = 2004
 LEAST_FOR_SHAPE = 8  # samples, for D'Agostino's test
@@ -210,12 +211,9 @@ def _runs(experiment: Experiment, statistics: Statistics) -> tuple[IdentifiedRun
         series = []
         for k, (output, measured) in enumerate(zip(experiment.outputs, run.outputs.values(), strict=True)):
             row = number * count + k
-            simulated, valid = at.predicted[row, :n], np.isfinite(measured)
-            if output.offset and valid.any():
-                simulated = simulated + float(np.mean(measured[valid] - simulated[valid]))
+            simulated, _, rmse = with_zero(measured, at.predicted[row, :n], output.offset)
             jacobian = at.jacobian[row, :n][:, picked] * noise[row]
             spread = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", jacobian, covariance, jacobian), 0.0))
-            rmse = float(np.sqrt(np.mean((measured[valid] - simulated[valid]) ** 2))) if valid.any() else np.nan
             series.append(IdentifiedSeries(output.name, measured, simulated, spread, rmse))
         records.append(IdentifiedRun(run.name, run.role, run.time, run.inputs, tuple(series)))
     return tuple(records)

@@ -24,6 +24,7 @@ from smajax.data.model_file.its_experiment import experiment_of_model
 from smajax.fit.experiment_check import ExperimentCheck
 from smajax.fit.identify_result import Identified
 from smajax.model.system import System
+from smajax.report.check_words import warnings
 
 RUN = "another_run.csv"
 RUNS = ("first_run.csv", "second_run.csv", "third_run.csv")
@@ -150,7 +151,7 @@ def after_check(found: ExperimentCheck, experiment: str) -> list[Step]:
     again = Step("After a change of the file, check it again", command("check", experiment))
     fit = Step("Fit the unknowns", command("identify", experiment, "--out", "identified"))
     search = Step("Find what the model lacks", command("close-loop", experiment, "--out", "report"))
-    return [*[again] * bool(found.warnings), *[fit] * bool(found.unknowns), search]
+    return [*[again] * bool(warnings(found)), *[fit] * bool(found.unknowns), search]
 
 
 def after_identify(result: Identified, folder: Path, experiment: str) -> list[Step]:
