@@ -141,8 +141,11 @@ class _Stage:
         """
         if len(found.effects) < MANY or leaves_noise(self.setting, found):
             return None
-        named = self._asked(search).found.likeliest
-        if named is None or not leaves_noise(self.setting, named) or not self._likelier(search, found, [named]):
+        asked = self._asked(search)
+        if asked.fits is None or not self._likelier(search, found, asked.fits.fitted[:1]):
+            return None
+        named = asked.found.likeliest
+        if named is None or not leaves_noise(self.setting, named):
             return None
         return self._one_effect(search, found, [named]) or found
 

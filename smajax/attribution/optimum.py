@@ -86,7 +86,10 @@ def at_optimum(
     problem, index = joint.restricted(carried)
     problem = problem.with_noise(error)
     task = problem.task(model.names, joint.bounds, model.values[index])
-    settings = dataclasses.replace(search.settings, stage="taking the model to its optimum")
+    # At a kink, as of a friction, a fit may come nearer to it by ever smaller steps, none of which any evidence or standard error shows.
+    settings = dataclasses.replace(
+        search.settings, stage="taking the model to its optimum", absolute_tolerance=SETTLED_COST
+    )
     (fit,) = levenberg_marquardt(problem, [task], settings)
     values = np.array(model.values)
     values[index] = fit.values

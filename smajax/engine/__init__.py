@@ -17,6 +17,7 @@ machine code, and threads that run it (`kernel`), cached on disk (`cache`); or `
 """
 
 from smajax.engine.arguments import key_of as key_of
+from smajax.engine.directions import Along as Along
 from smajax.engine.facade import Coming as Coming
 from smajax.engine.facade import Engine as Engine
 from smajax.engine.facade import EngineError as EngineError

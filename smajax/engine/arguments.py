@@ -52,19 +52,28 @@ def key_of(function: Hashable, model: Any, names: tuple[str, ...]) -> Hashable:
     return key
 
 
-def check_arguments(made_for: Signature, names: tuple[str, ...], model: Any, own: dict[str, np.ndarray]) -> None:
+def check_arguments(
+    made_for: Signature,
+    names: tuple[str, ...],
+    model: Any,
+    own: dict[str, np.ndarray],
+    along: tuple[str, ...] = (),
+    directions: int = 1,
+) -> None:
     """Raise ValueError where a program made for `made_for` and `names` is called with another model or other arrays.
 
-    `own` are arrays of shape (runs,), at least one run, of one length. Machine code reads memory by the shapes that it
+    `own` are arrays of shape (runs,), at least one run, of one length; those of `along` of shape (runs, directions). Machine code reads memory by the shapes that it
     was made for, so another shape would be read beyond its end.
     """
     if set(own) != set(names):
         raise ValueError(f"Got arrays named {sorted(own)}; the program was made for {sorted(names)}. Give one of each.")
     shapes = {name: np.shape(one) for name, one in own.items()}
-    lengths = set(shapes.values())
-    if len(lengths) > 1 or any(len(shape) != 1 or shape[0] < 1 for shape in lengths):
+    lengths = {shape[:1] for shape in shapes.values()}
+    kinds = {name: (directions,) if name in along else () for name in names}
+    if len(lengths) > 1 or any(shape[1:] != kinds[name] or shape[:1] < (1,) for name, shape in shapes.items()):
+        several = f", of {', '.join(along)} shape (runs, {directions})" if along else ""
         raise ValueError(
-            f"Got arrays of the shapes {shapes}; expected one number a run, shape (runs,), and the same number of runs for all. "
+            f"Got arrays of the shapes {shapes}; expected one number a run, shape (runs,){several}, and the same number of runs for all. "
             "Repeat a number that all runs share with `np.full`."
         )
     got = signature(model)

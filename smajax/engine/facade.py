@@ -24,6 +24,7 @@ from smajax.core.operating_system import WINDOWS, available_cores
 from smajax.engine import xla
 from smajax.engine.arguments import check_arguments, checked_threads, key_of, signature
 from smajax.engine.cache import versions
+from smajax.engine.directions import Along
 from smajax.engine.kernel import Stopped
 from smajax.engine.text import Unsupported
 from smajax.engine.traced import Function, Traced
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 
 Engine = Literal["auto", "native", "xla"]
 VARIABLE = "SMAJAX_ENGINE"
+ONE_DIRECTION = Along()
 CACHED = 128  # programs that a process remembers
 Made = TypeVar("Made")
 
@@ -78,10 +80,11 @@ class Program:
         alone: bool,
         native: NativeProgram | None,
         replaceable: bool = False,
+        along: Along = ONE_DIRECTION,
     ) -> None:
         """`model` and `names` are what it is made for; `replaceable`: XLA may stand in for `native`."""
         self._function, self._alone, self._replaceable, self.native = function, alone, replaceable, native
-        self._made_for, self._names = signature(model), names
+        self._made_for, self._names, self._along = signature(model), names, along
         self._blocks = xla.BlockLengths()
 
     def __call__(
@@ -89,13 +92,14 @@ class Program:
     ) -> Any:
         """What the function gives, arrays of numpy, every leaf with one row a run; `own` are arrays of shape (runs,).
 
+        With directions, `own` of `along` has shape (runs, directions), and every leaf (runs, directions, ...).
         `threads` of machine code: by default as many as there are cores. It raises Stopped soon after another thread has set `stop`.
         """
-        check_arguments(self._made_for, self._names, model, own)
+        check_arguments(self._made_for, self._names, model, own, *self._along)
         threads = available_cores() if threads is None else checked_threads(threads)
         native = self.native
         if native is None:
-            return xla.evaluated(self._function, model, own, self._alone, self._blocks)
+            return self._by_xla(model, own)
         try:
             return native(model, own, threads, stop)
         except Stopped:
@@ -105,10 +109,19 @@ class Program:
                 raise
             failure = error
         # What XLA raises too is the caller's: it is raised, and machine code stays.
-        results = xla.evaluated(self._function, model, own, self._alone, self._blocks)
+        results = self._by_xla(model, own)
         self.native = None
         _warn(failure, "failed while it ran")
         return results
+
+    def _by_xla(self, model: Any, own: dict[str, np.ndarray]) -> Any:
+        """The same by XLA, to which every direction is a run."""
+        names, count = self._along
+        if not names:
+            return xla.evaluated(self._function, model, own, self._alone, self._blocks)
+        each = {name: one.ravel() if name in names else np.repeat(one, count) for name, one in own.items()}
+        results = xla.evaluated(self._function, model, each, self._alone, self._blocks)
+        return jax.tree.map(lambda leaf: leaf.reshape(-1, count, *leaf.shape[1:]), results)
 
     def wait(self) -> None:
         """Until it is compiled, where that goes on beside the caller; what goes wrong there shows at the first call."""
@@ -165,6 +178,7 @@ def cached(made: dict[Hashable, Made], key: Hashable, make: Callable[[], Made]) 
 _programs: dict[Hashable, Program] = {}
 
 
+# Keywords, which a caller names one by one.
 def program(
     function: Function,
     model: Any,
@@ -175,20 +189,22 @@ def program(
     devices: Sequence[jax.Device] = (),
     beside: bool = False,
     quickly: bool = False,
+    along: Along = ONE_DIRECTION,
 ) -> Program:
     """`function(model, own)` compiled for models of this kind; `names` are those of the numbers that a run has of its own.
 
     `alone`: for one run at a time. `devices`: where XLA would run it; under "auto" anything but a processor is XLA's. `beside`: it is compiled beside
     the caller, who waits for it at its first call, and may have others traced meanwhile. `quickly`: in half the time or less, of
-    a program that is not run for long: a run takes a tenth longer.
+    a program that is not run for long: a run takes a tenth longer. `along`: those of `names` of which a run has several numbers, one for each direction; machine code
+    computes once a run what does not depend on them.
     Raises, under "native" alone, what stands in the way of machine code: Unsupported for what has no translation,
     ImportError without llvmlite, and whatever else goes wrong. What the function itself raises is always raised.
     """
     meant = engine_of(engine)
     if meant == "auto" and devices and devices[0].platform != "cpu":
         meant = "xla"
-    key = (key_of(function, model, names), alone, meant, quickly)
-    return cached(_programs, key, lambda: _made(function, model, names, alone, meant, beside, quickly))
+    key = (key_of(function, model, names), alone, meant, quickly, along)
+    return cached(_programs, key, lambda: _made(function, model, names, alone, meant, beside, quickly, along))
 
 
 @contextmanager
@@ -205,25 +221,33 @@ def _collector_paused() -> Iterator[None]:
 
 @_collector_paused()
 def _made(
-    function: Function, model: Any, names: tuple[str, ...], alone: bool, engine: Engine, beside: bool, quickly: bool
+    function: Function,
+    model: Any,
+    names: tuple[str, ...],
+    alone: bool,
+    engine: Engine,
+    beside: bool,
+    quickly: bool,
+    along: Along,
 ) -> Program:
+    made = partial(Program, function, model, names, alone, along=along)
     if engine == "xla":
-        return Program(function, model, names, alone, None)
+        return made(None)
     traced = Traced(function, model, names)  # what goes wrong in here goes wrong by XLA too
     if engine == "auto" and WINDOWS:
         _say(UNTRIED)
-        return Program(function, model, names, alone, None)
+        return made(None)
     try:
         # Imported here: the translator reads names of JAX that a release may move, and then XLA has to run all the same.
         from smajax.engine.native import NativeProgram
 
-        native = NativeProgram(traced, alone, beside, quickly)
+        native = NativeProgram(traced, alone, beside, quickly, along)
     except Exception as error:
         if engine == "native":
             raise
         _warn(error, "could not be made")
-        return Program(function, model, names, alone, None)
-    return Program(function, model, names, alone, native, replaceable=engine == "auto")
+        return made(None)
+    return made(native, replaceable=engine == "auto")
 
 
 def reason(error: BaseException) -> str:

@@ -14,19 +14,28 @@ import numpy as np
 from smajax.core.compiling import compiling
 from smajax.engine import cache
 from smajax.engine.arguments import is_array
+from smajax.engine.directions import Along
 from smajax.engine.kernel import Kernel, compiled, divides_slowly, has_wide_vectors, vector_bits
 from smajax.engine.traced import Traced, plain
 from smajax.engine.translate import VECTORS, Translated, translate
 
 BITS = 60  # of the number by which runs are put in order
+ONE_DIRECTION = Along()
 MOST_SORTED = 6  # numbers of a run that are looked at for that
 
 
 class NativeProgram:
     """`function(model, own)` of one run as a function of whole arrays, for models with arrays of the same shapes."""
 
-    def __init__(self, traced: Traced, alone: bool, beside: bool = False, quickly: bool = False) -> None:
-        """`alone`: for one run at a time. `beside`: compiled by another thread, for which the first call waits. `quickly`: as of `program`.
+    def __init__(
+        self,
+        traced: Traced,
+        alone: bool,
+        beside: bool = False,
+        quickly: bool = False,
+        along: Along = ONE_DIRECTION,
+    ) -> None:
+        """`alone`: for one run at a time. `beside`: compiled by another thread, for which the first call waits. `quickly`, `along`: as of `program`.
 
         Raises Unsupported for what has no translation, and whatever LLVM raises: beside, at the first call.
         """
@@ -35,10 +44,21 @@ class NativeProgram:
         dtypes = {*kinds, *(str(aval.dtype) for aval in program.out_avals)}
         own = [False] * traced.shared + [True] * len(traced.names)
         vectors = 1 if alone else VECTORS
-        translated = translate(program, own, lanes_of(dtypes), divides_slowly(), vectors, mask_of(dtypes))
+        each = [False] * traced.shared + [name in along.names for name in traced.names]
+        translated = translate(
+            program,
+            own,
+            lanes_of(dtypes),
+            divides_slowly(),
+            vectors,
+            mask_of(dtypes),
+            along=each,
+            directions=along.number,
+        )
         self.scratch = translated.scratch  # memory that a thread works in, bytes
         self._kernel = _begun(translated, quickly) if beside else _done(translated, quickly)
         self._tree, self._names, self._dtype = traced.tree, traced.names, traced.number
+        self._along, self._several = along, translated.several
         self._shared = [np.dtype(kind) for kind in kinds[: traced.shared]]
 
     def wait(self) -> None:
@@ -48,16 +68,34 @@ class NativeProgram:
                 wait([self._kernel])
 
     def __call__(self, model: Any, own: dict[str, np.ndarray], threads: int, stop: Event | None = None) -> Any:
-        """What the function gives, every leaf with one row a run; `own` are arrays of shape (runs,). Raises Stopped once `stop` is set."""
+        """What the function gives, every leaf with one row a run; `own` are arrays of shape (runs,), of `along` (runs, directions).
+
+        Leaves then have shape (runs, directions, ...). Raises Stopped once `stop` is set.
+        """
         leaves = jax.tree.leaves(eqx.filter(model, is_array))
         shared = [
             np.ascontiguousarray(plain(leaf), dtype=dtype) for leaf, dtype in zip(leaves, self._shared, strict=True)
         ]
-        order = alike([own[name] for name in self._names])
-        values = [np.ascontiguousarray(own[name][order], dtype=self._dtype) for name in self._names]
+        order = alike([own[name] for name in self._names if name not in self._along.names])
+        columns = [column for name in self._names for column in np.atleast_2d(own[name].T)]
+        values = [np.ascontiguousarray(column[order], dtype=self._dtype) for column in columns]
         back = np.argsort(order)
         found = self._kernel.result()(shared, values, threads, stop)
-        return jax.tree.unflatten(self._tree, [one[back] for one in found])
+        if not self._along.names:
+            return jax.tree.unflatten(self._tree, [one[back] for one in found])
+        return jax.tree.unflatten(self._tree, self._by_direction(found, back))
+
+    def _by_direction(self, found: Sequence[np.ndarray], back: np.ndarray) -> list[np.ndarray]:
+        """Leaves of shape (runs, directions, ...) of what the program gives; what is the same in all directions is there once."""
+        rest, count, leaves = iter(found), self._along.number, []
+        for each in self._several:
+            parts = [next(rest) for _ in range(count if each else 1)]
+            if each:
+                leaves.append(np.stack(parts, axis=1)[back])
+            else:
+                one = parts[0][back]
+                leaves.append(np.broadcast_to(one[:, None], (len(one), count, *one.shape[1:])))
+        return leaves
 
 
 def _done(translated: Translated, quickly: bool) -> Future[Kernel]:

@@ -13,7 +13,7 @@ time of a whole `identify` with compiled programs at hand):
 | demo, complete model | 192, before 192 | 7e-15 off | 0.29 s, before 0.24 s | 1.26 s, before 1.30 s |
 | bias-spring bench, 15 free | 566, before 562 | 7e-10 off | 1.56 s, before 1.20 s | 12.7 s, before 11.8 s |
 
-Unless the step before kept what it promised, a round first asks what the step's cost is, one run where derivatives take one for each free parameter, and
+Unless the step before kept what it promised, or derivatives take few runs, a round first asks what the step's cost is, one run where derivatives take one for each few free parameters, and
 shortens the step until it is lower. So a fit may begin with nearly the whole step of Gauss and Newton. On 27 fits of nine problems (bench, demo, a dead weight with friction) a cost within 1 of
 the least took half of the runs that it took with derivatives at every step and a first damping of 0.1, and the base models of 36 benches ended at
 the same cost from either damping. Secants in the place of derivatives (Broyden 1965), and of several dampings the best, took more.
@@ -50,7 +50,7 @@ from smajax.fit.bounded_descent import (
     bounded_quadratic_minimum,
 )
 from smajax.fit.normal_equations import NormalEquations, costs, normal_equations
-from smajax.fit.outputs_of_runs import chunks
+from smajax.fit.outputs_of_runs import chunks, runs_of_derivatives
 from smajax.fit.problem import FitTask, Problem
 
 MAX_STEPS = 120
@@ -60,6 +60,9 @@ GOAL_STEPS = 4  # after which a fit has to promise to come to its goal
 TWICE = 2.0  # the model's decrease: of a fit that is far from its optimum it says too little
 PADDING = 8  # free parameters are padded to a multiple of this: one compiled program serves fits of several sizes
 KEPT = 0.75  # share of the promised decrease, from which on the next step's derivatives are taken without asking for its cost
+FEW_RUNS = (
+    8  # of derivatives of all fits, up to which they take no longer than their costs alone: side by side in one vector
+)
 AT_ONCE = 4  # shorter steps that are tried at once after one was rejected: runs come in groups of so many and more
 DESCENT, SEARCH = BoundedDampedNewtonDescent(), GainRatioSearch()
 
@@ -313,7 +316,8 @@ def levenberg_marquardt(
             progress(_best(fits, settings.stage))
         if not going:
             break
-        likely = [k for k in going if fits.likely_accepted(k)]
+        few = runs_of_derivatives(problem, len(going), directions) <= FEW_RUNS
+        likely = [k for k in going if few or fits.likely_accepted(k)]
         fits.advance([*likely, *fits.lowered([k for k in going if k not in likely])])
         fits.states = _without_exceeding(tasks, fits.states, number + 1, settings)
         if number + 1 == settings.one_of_each:

@@ -179,8 +179,8 @@ def test_derivatives_are_the_models_own_where_one_step_a_sample_is_far_off(
     base = fitted_model(joint, (), problem.start_values(), ())
     taken: dict[int, Any] = {}
 
-    def recorded(problem: Any, *given: Any) -> Any:
-        residual, columns = residual_and_columns(problem, *given)
+    def recorded(problem: Any, *given: Any, **named: Any) -> Any:
+        residual, columns = residual_and_columns(problem, *given, **named)
         taken.setdefault(problem.batch.integration.substeps, columns)
         return residual, columns
 

@@ -114,7 +114,7 @@ def _stage_and_search(
     asked: list[Any] = []
     fitted = [_model(["unknown_reading_of_time"], *one) for one in functions]
     named = fitted[0] if fitted and confirmed else None
-    found = AskedFor(cast(Any, SimpleNamespace(fitted=fitted)), Lacking((), named))
+    found = AskedFor(cast(Any, SimpleNamespace(fitted=fitted)), lambda: Lacking((), named))
 
     def asked_for(_: Any, base: Any) -> AskedFor:
         asked.append(base)
@@ -372,7 +372,7 @@ def test_with_a_record_corrected_the_search_begins_at_the_effects_beside_which_i
 
 def test_without_what_held_out_runs_reject_nothing_is_asked_for_again(monkeypatch: pytest.MonkeyPatch) -> None:
     """Unknown functions beside the base model are those of before, and no fit run's record is corrected any more."""
-    known = AskedFor(None, Lacking())
+    known = AskedFor(None, Lacking)
     stages: list[Any] = []
     monkeypatch.setattr(joint_stage._Stage, "resumed", lambda stage, _: stages.append(stage))
     monkeypatch.setattr(joint_stage, "_kept_at_half_step", lambda _, searched: searched())

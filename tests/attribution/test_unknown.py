@@ -20,10 +20,11 @@ from smajax.attribution.findings import UnknownTerm
 from smajax.attribution.formulas import formulas
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.reasons import UnknownTermLikelier
+from smajax.attribution.score_test import Score
 from smajax.attribution.unknown.ranges import Sought
 from smajax.attribution.unknown.search import Lacking, _explains, in_place_of, unknown_terms
 from smajax.attribution.unknown.spline import COUNT, WAVES, design, powers_of, spline
-from smajax.attribution.unknown.term_fits import with_terms
+from smajax.attribution.unknown.term_fits import _best_of_each, programs_of_terms, with_terms, worth_a_fit
 from smajax.attribution.unknown.terms import UNKNOWN
 from smajax.core.parameters import parameters
 from smajax.core.result_cache import ResultCache
@@ -263,6 +264,35 @@ def test_held_out_runs_validate_a_term_or_reject_it(there: bool) -> None:
     assert best.held_out_before is not None
     assert best.held_out_after is not None
     assert (best.held_out_after < best.held_out_before) == there
+
+
+def test_terms_that_promise_too_little_for_their_prior_odds_are_not_fitted() -> None:
+    none = SimpleNamespace(squares=100.0)
+    # Half of 100 over 0.5 squared is 200 nats; three of prior odds are a 67th of it, of which a fit may come to four times.
+    worth = worth_a_fit(none, 0.5, -3.0)  # type: ignore[arg-type]
+    assert worth == pytest.approx(3.0 / 4.0 / 200.0)
+    gains = {"unknown_heating_curve": 0.3, "unknown_loss_of_temperature": 0.9 * worth, "unknown_force_of_speed": worth}
+    scores = [Score((name,), gain, 0.5, {}) for name, gain in sorted(gains.items(), key=lambda one: -one[1])]
+    chosen = [one.effects[0] for one in _best_of_each(scores, 6, worth)]
+    assert chosen == ["unknown_heating_curve", "unknown_force_of_speed"]
+    # Where none is worth a fit the best is fitted all the same: it is the nearest that there is.
+    assert [one.effects[0] for one in _best_of_each(scores, 6, 0.5)] == ["unknown_heating_curve"]
+    assert _best_of_each([Score(("unknown_heating_curve",), 0.0, 1.0, {})], 6, 0.5) == []
+
+
+def test_every_term_is_in_one_program_and_one_of_the_speed_in_its_own() -> None:
+    terms = list(UNKNOWN)
+    joint = SimpleNamespace(
+        free=lambda effects: range(100),
+        problem=SimpleNamespace(batch=SimpleNamespace(mask=np.ones((3, 700)))),
+        coefficients=dict.fromkeys(terms),
+    )
+    programs = programs_of_terms(joint, ("latent_heat",), terms)  # type: ignore[arg-type]
+    assert sorted(term for _, own in programs for term in own) == sorted(terms)
+    assert all(program == ("latent_heat", *own) for program, own in programs)
+    assert ["unknown_force_of_speed"] in [own for _, own in programs]
+    short = SimpleNamespace(**{**vars(joint), "problem": SimpleNamespace(batch=SimpleNamespace(mask=np.ones((1, 9))))})
+    assert programs_of_terms(short, ("latent_heat",), terms) == [(tuple(terms), terms)]  # type: ignore[arg-type]
 
 
 def test_without_a_missing_effect_no_unknown_term_is_named() -> None:

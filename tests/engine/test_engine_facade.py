@@ -28,7 +28,7 @@ from smajax.engine import (
     jax_versions,
     kernel,
     native,
-    translate,
+    translation,
 )
 from smajax.engine import program as compiled_program
 from smajax.engine.facade import _programs
@@ -109,7 +109,7 @@ BROKEN: dict[str, tuple[Break, str, type[Exception]]] = {
         Unsupported,
     ),
     "a fault of the translator": (
-        lambda patched: patched.setattr(translate, "row", _fails("out of step")),
+        lambda patched: patched.setattr(translation, "row", _fails("out of step")),
         "RuntimeError: out of step, while the operation `scan` was translated",
         RuntimeError,
     ),

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -35,6 +36,7 @@ from smajax.attribution.unknown.term_fits import (
 )
 from smajax.attribution.values_per_run import held_out_owners, held_out_residuals
 from smajax.core.whiteness import correlation_time, split_runs
+from smajax.fit.integration import unlimited, with_integration
 from smajax.fit.outputs_of_runs import misfits
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.fit.uncertainty import covariance_of, uncertainty
@@ -55,7 +57,12 @@ class AskedFor:
     """Unknown terms that were asked for beside one model; `fits`: None where none promises anything."""
 
     fits: TermFits | None
-    found: Lacking
+    learn: Callable[[], Lacking]
+
+    @cached_property
+    def found(self) -> Lacking:
+        """What the fits say; runs are left out for it, which takes as long as the fits: only where a term is likelier than what it is compared with."""
+        return self.learn()
 
 
 def unknown_terms(setting: Search, final: Model) -> Lacking:
@@ -128,7 +135,7 @@ def _explains(with_it: float, without: float, noise: float) -> bool:
 def asked_for(setting: Search, model: Model | FittedModel) -> AskedFor:
     """Unknown terms beside `model`."""
     fits = fits_with_terms(setting, model)
-    return AskedFor(fits, Lacking() if fits is None else learnt(setting, fits))
+    return AskedFor(fits, Lacking if fits is None else partial(learnt, setting, fits))
 
 
 def in_place_of(setting: Search, first: Model, final: Model, asked: AskedFor | None = None) -> Lacking | None:
@@ -139,7 +146,7 @@ def in_place_of(setting: Search, first: Model, final: Model, asked: AskedFor | N
     """
     if asked is None or not _same_base(setting, first, asked):
         asked = asked_for(setting, first)
-    fits, found = asked.fits, asked.found
+    fits = asked.fits
     if fits is None:
         return None
     joint = setting.joint(setting.candidates)
@@ -148,6 +155,7 @@ def in_place_of(setting: Search, first: Model, final: Model, asked: AskedFor | N
     ahead = max(one.log_evidence(error**2) for one in fits.fitted) - effects.log_evidence(error**2)
     if ahead <= 0.0:
         return None
+    found = asked.found
     best = found.terms[0]
     little = ahead > INDISTINGUISHABLE and best.log_odds > 0.0 and best.held_out_before is None
     little = little and _less(best.left_out_after, min(best.left_out_before, final.left_out_rmse))
@@ -185,7 +193,9 @@ def _learnt(
     centre = design(share).mean(axis=0) if term.only_changes else np.zeros(len(own))
     grid = np.linspace(0.0, 1.0, search.config.term_points)
     basis = design(grid) - centre
-    sensitive = sensitivity(search.problem, model.values, [*others, *own])
+    # The fit came to where its runs take just the tries that they may: by another program's rounding one more.
+    problem = with_integration(search.problem, unlimited(search.problem.batch.integration))
+    sensitive = sensitivity(problem, model.values, [*others, *own])
     covariance, held_ones = (
         _covariance(search, sensitive, model.values, own, names) * scale**2 for names in ((*others, *own), own)
     )
@@ -194,7 +204,7 @@ def _learnt(
     )
     counts = np.histogram(share, search.config.term_bins, (0.0, 1.0))[0]
     mask = np.asarray(search.problem.batch.mask)
-    misfit = misfits(search.problem, [model.values])[0]
+    misfit = misfits(problem, [model.values])[0]
     samples = float(mask.sum()) / correlation_time(split_runs(misfit, mask))
     reading = search.problem.system.load.reading[1]
     state_unit, unit = (reading if one == "reading" else one for one in (term.state_unit, term.unit))

@@ -131,7 +131,7 @@ const smajaxPlots = (() => {
         bind: { mousedown: (u, over, act) => event => { if (event.button === 0 && event.shiftKey) { grab(u, event); return null; } return act(event); } },
       },
       scales: { x: { time: false }, y: panel.log ? { distr: 3 } : panel.range ? { range: panel.range } : {} },
-      series, bands, axes: [axis(below), axis({ size: 54, values: (u, splits) => splits.map(one => one == null ? "" : String(Number(one.toPrecision(6)))), space: 24 })],
+      series, bands, axes: [axis(below), axis({ size: 66, values: (u, splits) => splits.map(one => one == null ? "" : String(Number(one.toPrecision(6)))), space: 24 })],
       hooks: {
         drawClear: [u => {
           u.ctx.fillStyle = colour("tint", 0.35);
