@@ -30,7 +30,7 @@ class Along(NamedTuple):
 
 
 def any_several(given: Sequence[Value | Several]) -> bool:
-    return any(type(one) is Several for one in given)
+    return Several in map(type, given)  # asked at every operation
 
 
 def of_direction(given: Sequence[Value | Several], number: int) -> list[Value]:

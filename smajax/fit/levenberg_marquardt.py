@@ -58,7 +58,7 @@ TOLERANCE = 1e-8  # of the cost: what the last step may still lower it by, and p
 MAX_DAMPING = 1e10  # at which no step lowers the cost
 GOAL_STEPS = 4  # after which a fit has to promise to come to its goal
 TWICE = 2.0  # the model's decrease: of a fit that is far from its optimum it says too little
-PADDING = 8  # free parameters are padded to a multiple of this: one compiled program serves fits of several sizes
+PADDING = 16  # free parameters are padded to a multiple of this: one compiled program serves fits of several sizes
 KEPT = 0.75  # share of the promised decrease, from which on the next step's derivatives are taken without asking for its cost
 FEW_RUNS = (
     8  # of derivatives of all fits, up to which they take no longer than their costs alone: side by side in one vector

@@ -32,7 +32,6 @@ from smajax.attribution.unknown.term_fits import (
     TermFits,
     fits_with_terms,
     least_error,
-    programs_of_terms,
 )
 from smajax.attribution.values_per_run import held_out_owners, held_out_residuals
 from smajax.core.whiteness import correlation_time, split_runs
@@ -90,10 +89,9 @@ def learnt(setting: Search, fits: TermFits) -> Lacking:
     without, enough = math.nan, False
     if asked:
         # The runs are left out of what is named, or may be in its place: refits take as long as the fits.
-        programs = programs_of_terms(fits.joint, fits.none.effects, [model.effects[-1] for model in fitted])
-        program_of = {term: own for own, terms in programs for term in terms}
+        program_of = fits.programs
         noise = float(search.problem.noise_sigma)
-        without = predicting(fits.joint, fits.none, error, noise, next(iter(program_of.values()))).left_out_rmse
+        without = predicting(fits.joint, fits.none, error, noise, program_of[likeliest.effects[-1]]).left_out_rmse
         predict = {
             name: predicting(fits.joint, model, error, noise, program_of[name]).left_out_rmse
             for model in fitted

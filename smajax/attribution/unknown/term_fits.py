@@ -112,6 +112,7 @@ class TermFits:
     none: FittedModel  # the base without a term
     fitted: tuple[FittedModel, ...]
     gains: Mapping[str, float]  # of the score test, by term
+    programs: Mapping[str, tuple[str, ...]]  # effects and terms of the program that each term was fitted in
 
     def log_odds(self, model: FittedModel, error: float) -> float:
         """Of a model with a term over the one without."""
@@ -137,9 +138,10 @@ def fits_with_terms(setting: Search, final: Model | FittedModel) -> TermFits | N
     if not chosen:
         return None
     places = first_places(search, joint, chosen, values)
+    programs = programs_of_terms(joint, final.effects, list(places))
     fitted: list[FittedModel] = []
     for _ in range(PASSES):
-        fitted = fitted_terms(search, joint, final.effects, places, error)
+        fitted = fitted_terms(search, joint, final.effects, programs, places, error)
         error = least_error(setting, [none, *fitted])
         fitted.sort(key=lambda model: -model.log_evidence(error**2))
         best = fitted[0].log_evidence(error**2)
@@ -149,7 +151,8 @@ def fits_with_terms(setting: Search, final: Model | FittedModel) -> TermFits | N
             break
         places = {one.effects[-1]: [one.values] for one in fitted}
     gains = {score.effects[0]: score.gain for score in scores}
-    return TermFits(search, found, joint, none, tuple(fitted), gains)
+    program_of = {term: own for own, terms in programs for term in terms}
+    return TermFits(search, found, joint, none, tuple(fitted), gains, program_of)
 
 
 def joint_with_terms(setting: Search, search: Search, final: Model | FittedModel) -> JointParameters:
@@ -196,22 +199,21 @@ def fitted_terms(
     search: Search,
     joint: JointParameters,
     effects: tuple[str, ...],
+    among: Sequence[tuple[tuple[str, ...], Sequence[str]]],
     places: Mapping[str, Sequence[np.ndarray]],
     error: float,
 ) -> list[FittedModel]:
-    """Every term fitted together with the parameters of the model with `effects`, from the best of its places."""
+    """Every term of `places` fitted together with the parameters of the model with `effects`, from the best of its places, in its program `among` those of all."""
     settings = comparison_settings(FitSettings(cache=search.cache, progress=search.progress), "fitting unknown terms")
     groups = []
-    programs = [
-        (program, terms, *joint.restricted(program))
-        for program, terms in programs_of_terms(joint, effects, list(places))
-    ]
+    own = [(program, [term for term in terms if term in places]) for program, terms in among]
+    programs = [(program, terms, *joint.restricted(program)) for program, terms in own if terms]
     made_ready([problem for _, _, problem, _ in programs])
     for program, terms, problem, index in programs:
         begun = nearest(problem.with_noise(error), [places[term] for term in terms], index)
         groups.append((program, [BegunFit((*effects, term), at) for term, at in zip(terms, begun, strict=True)]))
     fits = fits_by_program(joint, groups, error, settings)
-    return [fitted_model(joint, own, values, program) for own, program, values, _ in fits]
+    return [fitted_model(joint, one, values, program) for one, program, values, _ in fits]
 
 
 def programs_of_terms(
