@@ -16,8 +16,8 @@ jaxpr (`translate`, `array_operations`, `jax_versions`) -> LLVM's language (`tex
 machine code, and threads that run it (`kernel`), cached on disk (`cache`); or `xla`.
 """
 
+from smajax.engine.arguments import Along as Along
 from smajax.engine.arguments import key_of as key_of
-from smajax.engine.directions import Along as Along
 from smajax.engine.facade import Coming as Coming
 from smajax.engine.facade import Engine as Engine
 from smajax.engine.facade import EngineError as EngineError

@@ -15,6 +15,16 @@ def is_array(leaf: Any) -> bool:
     return isinstance(leaf, jax.Array | np.ndarray)
 
 
+class Along(NamedTuple):
+    """The names of the numbers of which a run has several, and how many: one for each direction."""
+
+    names: tuple[str, ...] = ()
+    number: int = 1
+
+
+ONE_DIRECTION = Along()
+
+
 class Signature(NamedTuple):
     """Of a model, all that a traced program depends on: everything but the values of its arrays."""
 
@@ -57,21 +67,20 @@ def check_arguments(
     names: tuple[str, ...],
     model: Any,
     own: dict[str, np.ndarray],
-    along: tuple[str, ...] = (),
-    directions: int = 1,
+    along: Along = ONE_DIRECTION,
 ) -> None:
     """Raise ValueError where a program made for `made_for` and `names` is called with another model or other arrays.
 
-    `own` are arrays of shape (runs,), at least one run, of one length; those of `along` of shape (runs, directions). Machine code reads memory by the shapes that it
+    `own` are arrays of shape (runs,), at least one run, of one length; those of `along` of shape (runs, `along.number`). Machine code reads memory by the shapes that it
     was made for, so another shape would be read beyond its end.
     """
     if set(own) != set(names):
         raise ValueError(f"Got arrays named {sorted(own)}; the program was made for {sorted(names)}. Give one of each.")
     shapes = {name: np.shape(one) for name, one in own.items()}
     lengths = {shape[:1] for shape in shapes.values()}
-    kinds = {name: (directions,) if name in along else () for name in names}
+    kinds = {name: (along.number,) if name in along.names else () for name in names}
     if len(lengths) > 1 or any(shape[1:] != kinds[name] or shape[:1] < (1,) for name, shape in shapes.items()):
-        several = f", of {', '.join(along)} shape (runs, {directions})" if along else ""
+        several = f", of {', '.join(along.names)} shape (runs, {along.number})" if along.names else ""
         raise ValueError(
             f"Got arrays of the shapes {shapes}; expected one number a run, shape (runs,){several}, and the same number of runs for all. "
             "Repeat a number that all runs share with `np.full`."

@@ -7,7 +7,7 @@ slopes of its equations are the same for all of them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 from smajax.engine.jax_versions import TABLE, opened, parameters_of
 from smajax.engine.values import Value
@@ -20,13 +20,6 @@ class Several(tuple[Value, ...]):
     """A value of its own for each direction."""
 
     __slots__ = ()
-
-
-class Along(NamedTuple):
-    """The names of the numbers of which a run has several, and how many: one for each direction."""
-
-    names: tuple[str, ...] = ()
-    number: int = 1
 
 
 def any_several(given: Sequence[Value | Several]) -> bool:

@@ -22,9 +22,8 @@ import numpy as np
 
 from smajax.core.operating_system import WINDOWS, available_cores
 from smajax.engine import xla
-from smajax.engine.arguments import check_arguments, checked_threads, key_of, signature
+from smajax.engine.arguments import ONE_DIRECTION, Along, check_arguments, checked_threads, key_of, signature
 from smajax.engine.cache import versions
-from smajax.engine.directions import Along
 from smajax.engine.kernel import Stopped
 from smajax.engine.text import Unsupported
 from smajax.engine.traced import Function, Traced
@@ -34,7 +33,6 @@ if TYPE_CHECKING:
 
 Engine = Literal["auto", "native", "xla"]
 VARIABLE = "SMAJAX_ENGINE"
-ONE_DIRECTION = Along()
 CACHED = 128  # programs that a process remembers
 Made = TypeVar("Made")
 
@@ -95,7 +93,7 @@ class Program:
         With directions, `own` of `along` has shape (runs, directions), and every leaf (runs, directions, ...).
         `threads` of machine code: by default as many as there are cores. It raises Stopped soon after another thread has set `stop`.
         """
-        check_arguments(self._made_for, self._names, model, own, *self._along)
+        check_arguments(self._made_for, self._names, model, own, self._along)
         threads = available_cores() if threads is None else checked_threads(threads)
         native = self.native
         if native is None:

@@ -13,14 +13,12 @@ import numpy as np
 
 from smajax.core.compiling import compiling
 from smajax.engine import cache
-from smajax.engine.arguments import is_array
-from smajax.engine.directions import Along
+from smajax.engine.arguments import ONE_DIRECTION, Along, is_array
 from smajax.engine.kernel import Kernel, compiled, divides_slowly, has_wide_vectors, vector_bits
 from smajax.engine.traced import Traced, plain
 from smajax.engine.translate import VECTORS, Translated, translate
 
 BITS = 60  # of the number by which runs are put in order
-ONE_DIRECTION = Along()
 MOST_SORTED = 6  # numbers of a run that are looked at for that
 
 
