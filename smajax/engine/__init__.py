@@ -12,7 +12,7 @@ last, in phases (`phases`) that keep their results in registers.
 Also public, for who divides runs into chunks: the sizes of blocks that XLA runs (`block_size`, `rounded`, `ON_CARD`, `on_card`), and what keys
 and bounds a cache of traced functions (`key_of`, `cached`).
 
-jaxpr (`translate`, `array_operations`, `jax_versions`) -> LLVM's language (`text`, `arithmetic`, `parts`, `phases`, `phase_functions`) ->
+jaxpr (`translate`, `translation`, `directions`, `array_operations`, `jax_versions`) -> LLVM's language (`text`, `arithmetic`, `parts`, `phases`, `phase_functions`) ->
 machine code, and threads that run it (`kernel`), cached on disk (`cache`); or `xla`.
 """
 
@@ -23,6 +23,7 @@ from smajax.engine.facade import Engine as Engine
 from smajax.engine.facade import EngineError as EngineError
 from smajax.engine.facade import EngineWarning as EngineWarning
 from smajax.engine.facade import Program as Program
+from smajax.engine.facade import by_machine_code as by_machine_code
 from smajax.engine.facade import cached as cached
 from smajax.engine.facade import engine_of as engine_of
 from smajax.engine.facade import program as program

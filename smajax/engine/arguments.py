@@ -62,6 +62,14 @@ def key_of(function: Hashable, model: Any, names: tuple[str, ...]) -> Hashable:
     return key
 
 
+def check_along(names: tuple[str, ...], along: Along) -> None:
+    """Raise ValueError for directions of numbers that there are not, or fewer than one."""
+    if not isinstance(along.names, tuple) or not set(along.names) <= set(names) or along.number < 1:
+        raise ValueError(
+            f"Got {along}; expected a tuple of some of the names {list(names)}, and from 1 direction on. Leave it out for one number a run."
+        )
+
+
 def check_arguments(
     made_for: Signature,
     names: tuple[str, ...],

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from smajax.engine.jax_versions import TABLE, opened, parameters_of
+from smajax.engine.jax_versions import SAME, TABLE, opened, parameters_of
 from smajax.engine.values import Value
 
 # Primitives with programs of their own.
@@ -76,6 +76,8 @@ class Dependence:
 
     def _of_equation(self, equation: Any, reads: list[bool]) -> Sequence[bool]:
         name = equation.primitive.name
+        if name in SAME:
+            return reads
         if name not in PROGRAMS:
             return [True] * len(equation.outvars)
         params = parameters_of(equation)

@@ -7,6 +7,7 @@ says what was in the way. The caller knows nothing of it. The environment variab
 from __future__ import annotations
 
 import gc
+import importlib.util
 import os
 import warnings
 from collections.abc import Callable, Hashable, Iterator, Sequence
@@ -22,7 +23,15 @@ import numpy as np
 
 from smajax.core.operating_system import WINDOWS, available_cores
 from smajax.engine import xla
-from smajax.engine.arguments import ONE_DIRECTION, Along, check_arguments, checked_threads, key_of, signature
+from smajax.engine.arguments import (
+    ONE_DIRECTION,
+    Along,
+    check_along,
+    check_arguments,
+    checked_threads,
+    key_of,
+    signature,
+)
 from smajax.engine.cache import versions
 from smajax.engine.kernel import Stopped
 from smajax.engine.text import Unsupported
@@ -61,6 +70,12 @@ class Coming:
 
     def __call__(self) -> Any:
         return self.result()
+
+
+def by_machine_code() -> bool:
+    """Whether "auto" means machine code here, where nothing stands in the way of a single program."""
+    engine = engine_of()
+    return engine == "native" or (engine == "auto" and not WINDOWS and importlib.util.find_spec("llvmlite") is not None)
 
 
 class Program:
@@ -139,7 +154,9 @@ class Program:
 
         `devices`, `block` and `room` (runs that one compilation has room for) are of XLA, `threads` of machine code.
         """
-        check_arguments(self._made_for, self._names, model, own)
+        check_arguments(self._made_for, self._names, model, own, self._along)
+        if self.native is None and self._along.names:
+            return Coming(partial(self._by_xla, model, own))
         if self.native is None:
             return Coming(xla.started(self._function, model, own, devices, block, room))
         pool, stop = ThreadPoolExecutor(1), Event()
@@ -198,6 +215,7 @@ def program(
     Raises, under "native" alone, what stands in the way of machine code: Unsupported for what has no translation,
     ImportError without llvmlite, and whatever else goes wrong. What the function itself raises is always raised.
     """
+    check_along(names, along)
     meant = engine_of(engine)
     if meant == "auto" and devices and devices[0].platform != "cpu":
         meant = "xla"

@@ -76,6 +76,8 @@ TABLE: Mapping[str, Mapping[str, tuple[Reading, ...]]] = {
 }
 
 
+# What says something to XLA, or to a derivative, and changes nothing.
+SAME = ("optimization_barrier", "name", "random_wrap", "random_unwrap")
 # Parameters of arithmetic that say where a result lies, or what its type already says.
 OF_PLACE_OR_TYPE = {"sharding", "out_sharding", "weak_type", "new_dtype"}
 

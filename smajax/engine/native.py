@@ -74,7 +74,8 @@ class NativeProgram:
         shared = [
             np.ascontiguousarray(plain(leaf), dtype=dtype) for leaf, dtype in zip(leaves, self._shared, strict=True)
         ]
-        order = alike([own[name] for name in self._names if name not in self._along.names])
+        by_run = [own[name] for name in self._names if name not in self._along.names]
+        order = alike(by_run) if by_run else np.arange(len(own[self._names[0]]))
         columns = [column for name in self._names for column in np.atleast_2d(own[name].T)]
         values = [np.ascontiguousarray(column[order], dtype=self._dtype) for column in columns]
         back = np.argsort(order)
@@ -83,16 +84,23 @@ class NativeProgram:
             return jax.tree.unflatten(self._tree, [one[back] for one in found])
         return jax.tree.unflatten(self._tree, self._by_direction(found, back))
 
-    def _by_direction(self, found: Sequence[np.ndarray], back: np.ndarray) -> list[np.ndarray]:
-        """Leaves of shape (runs, directions, ...) of what the program gives; what is the same in all directions is there once."""
-        rest, count, leaves = iter(found), self._along.number, []
+    def _by_direction(self, found: list[np.ndarray], back: np.ndarray) -> list[np.ndarray]:
+        """Leaves of shape (runs, directions, ...) of what the program gives, which is emptied on the way.
+
+        What is the same in all directions is there once, to be read and not written.
+        """
+        count, leaves = self._along.number, []
         for each in self._several:
-            parts = [next(rest) for _ in range(count if each else 1)]
-            if each:
-                leaves.append(np.stack(parts, axis=1)[back])
-            else:
-                one = parts[0][back]
-                leaves.append(np.broadcast_to(one[:, None], (len(one), count, *one.shape[1:])))
+            one = found.pop(0)
+            shape = (len(back), count, *one.shape[1:])
+            if not each:
+                leaves.append(np.broadcast_to(one[back][:, None], shape))
+                continue
+            leaf = np.empty(shape, one.dtype)
+            leaf[:, 0] = one[back]
+            for number in range(1, count):
+                leaf[:, number] = found.pop(0)[back]
+            leaves.append(leaf)
         return leaves
 
 

@@ -31,9 +31,8 @@ class Translated:
     results: tuple[Array, ...]
     scratch: int  # bytes a thread needs
     vectors: int = 1  # of a group
-    several: tuple[
-        bool, ...
-    ] = ()  # which results of the program are one for each direction, one after the other in `results`
+    # Which results of the program are one for each direction: they stand one after the other in `results`.
+    several: tuple[bool, ...] = ()
 
 
 def translate(

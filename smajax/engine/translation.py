@@ -27,7 +27,7 @@ from smajax.engine.by_numpy import computed
 from smajax.engine.directions import Dependence, Several, any_several, apart, of_direction, together
 from smajax.engine.equations import Read, Step, array_of, note, read_of, steps_of
 from smajax.engine.expansions import EXPANSIONS
-from smajax.engine.jax_versions import TABLE, expanded, opened
+from smajax.engine.jax_versions import SAME, TABLE, expanded, opened
 from smajax.engine.loop import Loop
 from smajax.engine.memory import in_memory, in_registers, mapped, row, write
 from smajax.engine.text import Array, Lane, Text, Unsupported, scalar_type
@@ -38,12 +38,6 @@ CALLS = {
     name for name, own in TABLE.items() if "program" in own and name != "scan"
 }  # they stand for a program of their own
 Prepared = tuple[tuple[Step, ...], list[Read]]  # the equations of a program, and what it ends with
-SAME = (
-    "optimization_barrier",
-    "name",
-    "random_wrap",
-    "random_unwrap",
-)  # what says something to XLA, or to a derivative, and changes nothing
 
 
 def _numbers(known: Any) -> np.ndarray:

@@ -13,8 +13,8 @@ time of a whole `identify` with compiled programs at hand):
 | demo, complete model | 192, before 192 | 7e-15 off | 0.29 s, before 0.24 s | 1.26 s, before 1.30 s |
 | bias-spring bench, 15 free | 566, before 562 | 7e-10 off | 1.56 s, before 1.20 s | 12.7 s, before 11.8 s |
 
-Unless the step before kept what it promised, or derivatives take few runs, a round first asks what the step's cost is, one run where derivatives take one for each few free parameters, and
-shortens the step until it is lower. So a fit may begin with nearly the whole step of Gauss and Newton. On 27 fits of nine problems (bench, demo, a dead weight with friction) a cost within 1 of
+Unless the step before kept what it promised, or the derivatives of all fits take few runs, a round first asks what the step's cost is: one run, where derivatives take one for every two or four free parameters. It
+shortens the step until the cost is lower. So a fit may begin with nearly the whole step of Gauss and Newton. On 27 fits of nine problems (bench, demo, a dead weight with friction) a cost within 1 of
 the least took half of the runs that it took with derivatives at every step and a first damping of 0.1, and the base models of 36 benches ended at
 the same cost from either damping. Secants in the place of derivatives (Broyden 1965), and of several dampings the best, took more.
 
@@ -60,9 +60,8 @@ GOAL_STEPS = 4  # after which a fit has to promise to come to its goal
 TWICE = 2.0  # the model's decrease: of a fit that is far from its optimum it says too little
 PADDING = 16  # free parameters are padded to a multiple of this: one compiled program serves fits of several sizes
 KEPT = 0.75  # share of the promised decrease, from which on the next step's derivatives are taken without asking for its cost
-FEW_RUNS = (
-    8  # of derivatives of all fits, up to which they take no longer than their costs alone: side by side in one vector
-)
+# Runs of the derivatives of all fits, up to which these take about as long as their costs alone: machine code runs so many side by side.
+FEW_RUNS = 8
 AT_ONCE = 4  # shorter steps that are tried at once after one was rejected: runs come in groups of so many and more
 DESCENT, SEARCH = BoundedDampedNewtonDescent(), GainRatioSearch()
 
@@ -267,8 +266,9 @@ class _Fits:
             tried = rejected
         return found
 
-    def advance(self, part: Sequence[int]) -> None:
-        """Take derivatives of these fits at `y_eval`, and the next step from there."""
+    def advance(self, part: Sequence[int]) -> list[int]:
+        """Take derivatives of these fits at `y_eval`, and the next step from there; those that reject it and go on."""
+        rejected = []
         for cut in chunks(self.problem, len(part), self.directions):
             now = list(part[cut])
             equations = normal_equations(self.problem, *self._evaluated(now, [self.states[k] for k in now]))
@@ -277,6 +277,9 @@ class _Fits:
                 self.states[k] = _advanced(self.states[k], at, self.tolerances)
                 if np.array_equal(self.states[k].y, there):
                     self.errors[k] = misfit
+                elif self.states[k].status == Status.RUNNING:
+                    rejected.append(k)
+        return rejected
 
 
 def levenberg_marquardt(
@@ -318,7 +321,9 @@ def levenberg_marquardt(
             break
         few = runs_of_derivatives(problem, len(going), directions) <= FEW_RUNS
         likely = [k for k in going if few or fits.likely_accepted(k)]
-        fits.advance([*likely, *fits.lowered([k for k in going if k not in likely])])
+        rejected = fits.advance([*likely, *fits.lowered([k for k in going if k not in likely])])
+        # A round is a step that each fit accepts: the rules that end fits early count rounds.
+        fits.advance(fits.lowered([k for k in rejected if k in likely]))
         fits.states = _without_exceeding(tasks, fits.states, number + 1, settings)
         if number + 1 == settings.one_of_each:
             fits.states = _best_of_each(tasks, fits.states)

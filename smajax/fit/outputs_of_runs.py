@@ -5,7 +5,7 @@ A point and some of its directions are one run of a compiled program, in forward
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import Any, TypeVar
@@ -17,7 +17,7 @@ import numpy as np
 
 from smajax.core.operating_system import available_cores
 from smajax.core.parameters import set_vector
-from smajax.engine import Along, Program, program
+from smajax.engine import Along, Program, by_machine_code, program
 from smajax.fit.packed_runs import predict_run
 from smajax.fit.problem import Problem
 from smajax.model.system import System
@@ -31,7 +31,7 @@ SHORT = 1000  # samples of a run, up to which quick compiling saves more time th
 # Derivatives that a run computes beside its outputs: the solution of each step and the slopes of its equations serve all of them. Of runs with as many samples
 # as that four take half of the time that they take one by one, and their program a third more to translate; with two a third less, and a tenth.
 ALONG_MANY, ALONG_FEW, MANY_SAMPLES = 4, 2, 500
-FEW = 256  # points up to which derivatives that nobody needs are quicker than compiling a second program without them
+FEW = 256  # points up to which derivatives that nobody needs, half of the time, are quicker than compiling a second program without them
 
 
 class _Run(eqx.Module):
@@ -91,11 +91,13 @@ def _along(run: _Run, scalars: dict[str, jax.Array]) -> tuple[jax.Array, jax.Arr
 
 
 def directions_of(problem: Problem) -> int:
-    """Derivatives that a run of a fit's program computes."""
+    """Derivatives that a run of a fit's program computes; of XLA's one, to which every direction is a run."""
+    if not by_machine_code():
+        return 1
     return ALONG_MANY if problem.batch.output.shape[-1] >= MANY_SAMPLES else ALONG_FEW
 
 
-def _program(problem: Problem, function: Function, run: _Run, names: Iterable[str], beside: bool = False) -> Program:
+def _program(problem: Problem, function: Function, run: _Run, names: Collection[str], beside: bool = False) -> Program:
     """`function` of a run of the problem, compiled quickly or not by what it is made for, the length of a run."""
     quickly = problem.batch.output.shape[-1] <= SHORT
     tangents = tuple(name for name in names if name.startswith("tangent"))
@@ -116,8 +118,10 @@ def _of_run(problem: Problem, points: np.ndarray, run: int) -> np.ndarray:
 
 
 def chunks(problem: Problem, count: int, directions: int = 1) -> list[slice]:
-    """`count` points, with so many series each, cut so that the series of a part take at most `MAX_BYTES`."""
-    at_once = max(1, MAX_BYTES // max(directions * problem.measured.nbytes, 1))
+    """`count` points, with so many directions each, cut so that the series of a part take at most `MAX_BYTES`."""
+    each = directions_of(problem)
+    series = -(-directions // each) * each
+    at_once = max(1, MAX_BYTES // max(series * problem.measured.nbytes, 1))
     return [slice(start, start + at_once) for start in range(0, count, at_once)]
 
 

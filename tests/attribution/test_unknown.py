@@ -24,7 +24,7 @@ from smajax.attribution.score_test import Score
 from smajax.attribution.unknown.ranges import Sought
 from smajax.attribution.unknown.search import Lacking, _explains, in_place_of, unknown_terms
 from smajax.attribution.unknown.spline import COUNT, WAVES, design, powers_of, spline
-from smajax.attribution.unknown.term_fits import _best_of_each, programs_of_terms, with_terms, worth_a_fit
+from smajax.attribution.unknown.term_fits import _best_of_each, programs_of_terms, with_terms
 from smajax.attribution.unknown.terms import UNKNOWN
 from smajax.core.parameters import parameters
 from smajax.core.result_cache import ResultCache
@@ -266,18 +266,18 @@ def test_held_out_runs_validate_a_term_or_reject_it(there: bool) -> None:
     assert (best.held_out_after < best.held_out_before) == there
 
 
-def test_terms_that_promise_too_little_for_their_prior_odds_are_not_fitted() -> None:
-    none = SimpleNamespace(squares=100.0)
-    # Half of 100 over 0.5 squared is 200 nats; three of prior odds are a 67th of it, of which a fit may come to four times.
-    worth = worth_a_fit(none, 0.5, -3.0)  # type: ignore[arg-type]
-    assert worth == pytest.approx(3.0 / 4.0 / 200.0)
-    gains = {"unknown_heating_curve": 0.3, "unknown_loss_of_temperature": 0.9 * worth, "unknown_force_of_speed": worth}
-    scores = [Score((name,), gain, 0.5, {}) for name, gain in sorted(gains.items(), key=lambda one: -one[1])]
-    chosen = [one.effects[0] for one in _best_of_each(scores, 6, worth)]
+def test_terms_that_gain_less_than_of_noise_are_not_fitted() -> None:
+    tests = (
+        ("unknown_heating_curve", 0.3, 1e-4),
+        ("unknown_force_of_speed", 0.1, 0.8),
+        ("unknown_loss_of_temperature", 0.05, 0.95),
+    )
+    scores = [Score((name,), gain, p_value, {}) for name, gain, p_value in tests]
+    chosen = [one.effects[0] for one in _best_of_each(scores, 6)]
     assert chosen == ["unknown_heating_curve", "unknown_force_of_speed"]
-    # Where none is worth a fit the best is fitted all the same: it is the nearest that there is.
-    assert [one.effects[0] for one in _best_of_each(scores, 6, 0.5)] == ["unknown_heating_curve"]
-    assert _best_of_each([Score(("unknown_heating_curve",), 0.0, 1.0, {})], 6, 0.5) == []
+    # Where all are like that the best is fitted all the same: it is the nearest that there is.
+    assert [one.effects[0] for one in _best_of_each(scores[2:], 6)] == ["unknown_loss_of_temperature"]
+    assert _best_of_each([Score(("unknown_heating_curve",), 0.0, 1.0, {})], 6) == []
 
 
 def test_every_term_is_in_one_program_and_one_of_the_speed_in_its_own() -> None:

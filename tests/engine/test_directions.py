@@ -149,3 +149,41 @@ def test_numbers_of_another_shape_than_runs_and_directions_are_refused() -> None
     for wrong in (own["dx"][:, 0], own["dx"][:, :2], own["dx"][:5]):
         with pytest.raises(ValueError, match=r"of dx, dy shape \(runs, 3\)"):
             made(MODEL, {**own, "dx": wrong})
+
+
+def test_a_run_whose_every_number_has_directions_is_computed() -> None:
+    own = {"dx": numbers()["dx"]}
+    made = program(
+        lambda model, own: 2.0 * own["dx"], MODEL, ("dx",), engine="native", along=Along(("dx",), DIRECTIONS)
+    )
+    np.testing.assert_allclose(made(MODEL, own), 2.0 * own["dx"])
+
+
+def test_results_that_are_on_their_way_have_directions_too() -> None:
+    own, derivative = numbers(), along(straight)
+    for engine in ("native", "xla"):
+        made = program(derivative, MODEL, tuple(own), engine=engine, along=Along(("dx", "dy"), DIRECTIONS))
+        coming = made.begin(MODEL, own, 1, (jax.devices("cpu")[0],), 8, 8)
+        for ours, theirs in zip(coming(), one_by_one(derivative, own), strict=True):
+            np.testing.assert_allclose(ours, theirs, rtol=1e-10, atol=1e-12)
+
+
+@pytest.mark.parametrize("wrong", [Along(("dx",), 0), Along(("dz",), 3), Along(["dx"], 3), Along("dx", 3)])  # type: ignore[arg-type]
+def test_directions_of_nothing_are_refused(wrong: Along) -> None:
+    with pytest.raises(ValueError, match="some of the names"):
+        program(along(straight), MODEL, tuple(numbers()), along=wrong)
+
+
+def test_a_number_that_passes_a_barrier_beside_a_direction_does_not_depend_on_it() -> None:
+    def steered(model: Any, own: Any) -> Any:
+        del model
+
+        def body(carry: Any, now: jax.Array) -> Any:
+            x, dx = lax.optimization_barrier(carry)
+            return (0.9 * x + now, dx * 0.5), lax.cond(x > 0.5, lambda a: 2.0 * a, lambda a: a - 1.0, dx)
+
+        return lax.scan(body, (own["x"], own["dx"]), MODEL.series)[1]
+
+    own = {name: one for name, one in numbers().items() if name in ("x", "dx")}
+    made = program(steered, MODEL, tuple(own), engine="native", along=Along(("dx",), DIRECTIONS))
+    np.testing.assert_allclose(made(MODEL, own), one_by_one(steered, own), rtol=1e-12)

@@ -12,6 +12,7 @@ import optimistix as optx
 import pytest
 from scipy.optimize import least_squares, lsq_linear
 
+from smajax.attribution.program_fits import comparison_settings
 from smajax.fit.bounded_descent import (
     BoundedDampedNewtonDescent,
     DescentState,
@@ -31,12 +32,14 @@ from smajax.fit.levenberg_marquardt import (
     _best_of_each,
     _initial_state,
     _without_exceeding,
+    levenberg_marquardt,
 )
 from smajax.fit.normal_equations import NormalEquations
 from smajax.fit.problem import FitTask
 from smajax.fit.robust import robust_variance
 from smajax.fit.sensitivity import Sensitivity
 from smajax.report.identifiability_words import weak_combinations
+from tests.helpers.hot_weight import hot_weight
 from tests.helpers.often import often
 
 TOLERANCES = TOLERANCE, 0.0
@@ -185,6 +188,33 @@ def test_of_fits_that_free_the_same_the_best_alone_goes_on() -> None:
     ]
     left = [int(state.status) for state in _best_of_each(tasks, states)]
     assert left == [Status.EXCEEDED, Status.RUNNING, Status.RUNNING]
+
+
+def test_steps_that_are_rejected_are_no_rounds_whether_costs_or_derivatives_are_asked_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Fits that end early are the same ones: far from the optimum a first step is shortened several times."""
+    joint = hot_weight({}).joint
+    effects = ("latent_heat", "rising_convection", "sensor_gain")
+    problem, _ = joint.restricted(effects)
+    problem = problem.with_noise(1e-3)
+    names, start = joint.free(effects), problem.start_values()
+    (best,) = levenberg_marquardt(problem, [problem.task(names, joint.bounds, start)])
+    settings = dataclasses.replace(comparison_settings(FitSettings(), "fitting"), least_cost=best.cost)
+    places = [problem.names.index(name) for name in names]
+    low, high = np.transpose([joint.bounds[name] for name in names])
+    fits = []
+    for few in (0, 8):
+        monkeypatch.setattr("smajax.fit.levenberg_marquardt.FEW_RUNS", few)
+        rng, found = np.random.default_rng(0), []
+        for _ in range(8):
+            values = np.array(start)
+            off = rng.uniform(-0.2, 0.2, len(names)) * (high - low)
+            values[places] = np.clip(best.values[places] + off, low, high)
+            found += levenberg_marquardt(problem, [problem.task(names, joint.bounds, values)], settings)
+        fits.append([(fit.status, fit.steps, round(fit.cost, 3)) for fit in found])
+    assert fits[0] == fits[1]
+    assert {Status.EXCEEDED, Status.CONVERGED} <= {status for status, *_ in fits[0]}
 
 
 def test_a_step_to_a_jacobian_that_is_not_finite_is_rejected() -> None:

@@ -60,7 +60,7 @@ class AskedFor:
 
     @cached_property
     def found(self) -> Lacking:
-        """What the fits say; runs are left out for it, which takes as long as the fits: only where a term is likelier than what it is compared with."""
+        """What the fits say, when it is first asked for: runs are left out for it, which takes as long as the fits."""
         return self.learn()
 
 

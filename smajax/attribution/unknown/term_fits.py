@@ -35,8 +35,8 @@ APPROXIMATE = 0.01
 PASSES = 2  # the error of a sample is first that of the model without a term, then that of the best with one
 LARGEST = 2.0  # size of a wave: each is then at most as large as the largest function that is sought
 MUCH = 1e4  # samples times directions of the derivative, of one fit
-BEYOND_LINEAR = 4.0  # times what a score test promises: more of a gain in log evidence no fit of a term came to
-TINY = 1e-300
+# p-value of a score test beyond which a term is not fitted: of residuals that have nothing to do with it nine in ten give it more.
+AS_NOISE = 0.9
 TOGETHER = 3  # terms in a program, which computes mostly the model that they are all beside
 REACH = 10.0  # in log odds behind the likeliest, within which a term is fitted again with the smaller error
 
@@ -83,23 +83,15 @@ def screened(setting: Search, values: np.ndarray) -> list[Score]:
     return ranked(at, setting.loose((), values), setting.candidates, setting.bounds)
 
 
-def _best_of_each(scores: Sequence[Score], count: int, worth: float) -> list[Score]:
-    """The best of each equation first, then the others by gain; of `count` those that gain as much as is `worth` a fit, or the best alone if any gains anything."""
+def _best_of_each(scores: Sequence[Score], count: int) -> list[Score]:
+    """The best of each equation first, then the others by gain; of `count` those that gain more than `AS_NOISE` says, or the best alone if any gains anything."""
     firsts: dict[str, Score] = {}
     for score in scores:
         firsts.setdefault(UNKNOWN[score.effects[0]].candidate.equation, score)
     leading = list(firsts.values())
     rest = [score for score in scores if score not in leading]
     found = [score for score in [*leading, *rest][:count] if score.gain > 0.0]
-    return [score for score in found if score.gain >= worth] or found[:1]
-
-
-def worth_a_fit(none: FittedModel, error: float, log_odds: float) -> float:
-    """Share of the squares that `none` leaves which a term has to take away by its score test: a fit comes to `BEYOND_LINEAR` times that at most.
-
-    Less than what the term's prior `log_odds` (negative) ask for makes no term likelier than none. `error` of an independent sample, SI.
-    """
-    return -log_odds / BEYOND_LINEAR / max(0.5 * none.squares / error**2, TINY)
+    return [score for score in found if score.p_value <= AS_NOISE] or found[:1]
 
 
 @dataclass(frozen=True)
@@ -129,14 +121,13 @@ def fits_with_terms(setting: Search, final: Model | FittedModel) -> TermFits | N
         return None
     search.progress(Stage("looking for the equation that lacks something", 0.0))
     scores = screened(search, values)
-    joint = joint_with_terms(setting, search, final)
-    none = fitted_model(joint, final.effects, values, tuple(joint.coefficients))
-    error = least_error(setting, [none])
-    worth = worth_a_fit(none, error, math.log(PRIOR_ODDS["event"]))
-    chosen = _best_of_each(scores, setting.config.terms_refitted, worth)
+    chosen = _best_of_each(scores, setting.config.terms_refitted)
     search.progress(Stage("looking for the equation that lacks something", 1.0))
     if not chosen:
         return None
+    joint = joint_with_terms(setting, search, final)
+    none = fitted_model(joint, final.effects, values, tuple(joint.coefficients))
+    error = least_error(setting, [none])
     places = first_places(search, joint, chosen, values)
     programs = programs_of_terms(joint, final.effects, list(places))
     fitted: list[FittedModel] = []
@@ -222,7 +213,7 @@ def programs_of_terms(
     """(effects and terms that a program carries, terms that are fitted in it).
 
     The program of all terms is there, from the screening. A run of it computes all of them, and takes six times as long as one of a
-    single term; where there is something to compute, one for each few terms is soon worth its second. A force that depends on the speed has one for itself: its load may shake.
+    single term; where there is something to compute, one for each few terms is soon worth its second. A force that depends on the speed has one for itself: with it a load may swing, and each run beside it would take as many steps.
     """
     directions = max(len(joint.free((*effects, term))) for term in terms)
     if directions * float(np.asarray(joint.problem.batch.mask).sum()) < MUCH:

@@ -91,7 +91,7 @@ def _none_named(findings: Findings, best: UnknownTerm) -> str:
         else:
             but = "it predicts runs left out no better"
         return f"{tried} {best.title} is likeliest, but {but}: {why}."
-    return f"{tried} none is likelier than no function at all. The nearest of those worth a fit is {best.title}: {why}."
+    return f"{tried} none is likelier than no function at all. The nearest of those that were fitted is {best.title}: {why}."
 
 
 def _or_listed(terms: Sequence[UnknownTerm]) -> str:
