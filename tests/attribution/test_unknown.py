@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from functools import cache
 from importlib import import_module
 from types import SimpleNamespace
@@ -267,17 +268,15 @@ def test_held_out_runs_validate_a_term_or_reject_it(there: bool) -> None:
 
 
 def test_terms_that_gain_less_than_of_noise_are_not_fitted() -> None:
-    tests = (
-        ("unknown_heating_curve", 0.3, 1e-4),
-        ("unknown_force_of_speed", 0.1, 0.8),
-        ("unknown_loss_of_temperature", 0.05, 0.95),
-    )
-    scores = [Score((name,), gain, p_value, {}) for name, gain, p_value in tests]
-    chosen = [one.effects[0] for one in _best_of_each(scores, 6)]
+    # Of eleven coefficients noise gives 11 squares of an independent sample on average, and less than 5.6 in one of ten.
+    gains = {"unknown_heating_curve": 0.3, "unknown_force_of_speed": 0.06, "unknown_loss_of_temperature": 0.05}
+    scores = [Score((name,), gain, 0.5, dict.fromkeys(map(str, range(11)), 0.0)) for name, gain in gains.items()]
+    chosen = [one.effects[0] for one in _best_of_each(scores, 6, 100.0)]
     assert chosen == ["unknown_heating_curve", "unknown_force_of_speed"]
+    assert len(_best_of_each(scores, 6, math.inf)) == 3
     # Where all are like that the best is fitted all the same: it is the nearest that there is.
-    assert [one.effects[0] for one in _best_of_each(scores[2:], 6)] == ["unknown_loss_of_temperature"]
-    assert _best_of_each([Score(("unknown_heating_curve",), 0.0, 1.0, {})], 6) == []
+    assert [one.effects[0] for one in _best_of_each(scores, 6, 1.0)] == ["unknown_heating_curve"]
+    assert _best_of_each([Score(("unknown_heating_curve",), 0.0, 1.0, {})], 6, 100.0) == []
 
 
 def test_every_term_is_in_one_program_and_one_of_the_speed_in_its_own() -> None:

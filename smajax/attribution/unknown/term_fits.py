@@ -9,12 +9,13 @@ from dataclasses import dataclass
 
 import jax.numpy as jnp
 import numpy as np
+import scipy  # its parts are imported when they are first used
 
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model, independent_error
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.program_fits import BegunFit, comparison_settings, fits_by_program
-from smajax.attribution.score_test import Score, ranked
+from smajax.attribution.score_test import Score, ranked, without
 from smajax.attribution.unknown.ranges import Sought, sought
 from smajax.attribution.unknown.terms import UNKNOWN, ForceOfSpeed
 from smajax.core.parameters import parameters
@@ -35,8 +36,11 @@ APPROXIMATE = 0.01
 PASSES = 2  # the error of a sample is first that of the model without a term, then that of the best with one
 LARGEST = 2.0  # size of a wave: each is then at most as large as the largest function that is sought
 MUCH = 1e4  # samples times directions of the derivative, of one fit
-# p-value of a score test beyond which a term is not fitted: of residuals that have nothing to do with it nine in ten give it more.
-AS_NOISE = 0.9
+AS_NOISE = 0.9  # of residuals that have nothing to do with a term would give it more: beyond that it is not fitted
+HARDLY_HELD = (
+    0.5  # of the squares that are left no value of the parameters would take away: their priors hardly hold them
+)
+TINY = 1e-300
 TOGETHER = 3  # terms in a program, which computes mostly the model that they are all beside
 REACH = 10.0  # in log odds behind the likeliest, within which a term is fitted again with the smaller error
 
@@ -77,21 +81,32 @@ def with_terms(setting: Search, final: Model | FittedModel) -> tuple[Search, np.
     return search, problem.start_values(), found
 
 
-def screened(setting: Search, values: np.ndarray) -> list[Score]:
-    """Every term's score test at the final model, best first."""
+def screened(setting: Search, values: np.ndarray) -> tuple[list[Score], float]:
+    """(every term's score test at the final model, best first; the share of the squares left there that no value of the parameters would take away)."""
     at = sensitivity(setting.problem, values, setting.every)
-    return ranked(at, setting.loose((), values), setting.candidates, setting.bounds)
+    loose = setting.loose((), values)
+    whole, beside = at.residual(), without(at, loose)[1]
+    share = float(beside @ beside) / max(float(whole @ whole), TINY)
+    return ranked(at, loose, setting.candidates, setting.bounds), share
 
 
-def _best_of_each(scores: Sequence[Score], count: int) -> list[Score]:
-    """The best of each equation first, then the others by gain; of `count` those that gain more than `AS_NOISE` says, or the best alone if any gains anything."""
+def _gains_as_of_noise(score: Score, squares: float) -> bool:
+    """Whether `AS_NOISE` of residuals like this one that have nothing to do with a term would give it more; `squares` left beside the parameters, over that of an independent sample."""
+    return float(scipy.stats.chi2.sf(score.gain * squares, len(score.coefficients))) > AS_NOISE
+
+
+def _best_of_each(scores: Sequence[Score], count: int, squares: float) -> list[Score]:
+    """The best of each equation first, then the others by gain; `count` of them without those that gain as of noise, or the best alone if any gains anything.
+
+    `squares`: as of `_gains_as_of_noise`.
+    """
     firsts: dict[str, Score] = {}
     for score in scores:
         firsts.setdefault(UNKNOWN[score.effects[0]].candidate.equation, score)
     leading = list(firsts.values())
     rest = [score for score in scores if score not in leading]
     found = [score for score in [*leading, *rest][:count] if score.gain > 0.0]
-    return [score for score in found if score.p_value <= AS_NOISE] or found[:1]
+    return [score for score in found if not _gains_as_of_noise(score, squares)] or found[:1]
 
 
 @dataclass(frozen=True)
@@ -120,14 +135,16 @@ def fits_with_terms(setting: Search, final: Model | FittedModel) -> TermFits | N
     if not search.candidates:
         return None
     search.progress(Stage("looking for the equation that lacks something", 0.0))
-    scores = screened(search, values)
-    chosen = _best_of_each(scores, setting.config.terms_refitted)
-    search.progress(Stage("looking for the equation that lacks something", 1.0))
-    if not chosen:
-        return None
+    scores, share = screened(search, values)
     joint = joint_with_terms(setting, search, final)
     none = fitted_model(joint, final.effects, values, tuple(joint.coefficients))
     error = least_error(setting, [none])
+    # Where priors hold parameters off what the runs ask of them, a score test says little of a fit.
+    squares = share * none.squares / error**2 if share > HARDLY_HELD else math.inf
+    chosen = _best_of_each(scores, setting.config.terms_refitted, squares)
+    search.progress(Stage("looking for the equation that lacks something", 1.0))
+    if not chosen:
+        return None
     places = first_places(search, joint, chosen, values)
     programs = programs_of_terms(joint, final.effects, list(places))
     fitted: list[FittedModel] = []
