@@ -6,14 +6,12 @@ slopes of its equations are the same for all of them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, overload
 
-from smajax.engine.jax_versions import SAME, TABLE, opened, parameters_of
+from smajax.engine.jax_versions import CALLS, SAME, opened, parameters_of
+from smajax.engine.text import Array
 from smajax.engine.values import Value
-
-# Primitives with programs of their own.
-PROGRAMS = {name for name, own in TABLE.items() if own.keys() & {"program", "body", "branches"}}
 
 
 class Several(tuple[Value, ...]):
@@ -30,9 +28,13 @@ def of_direction(given: Sequence[Value | Several], number: int) -> list[Value]:
     return [one[number] if isinstance(one, Several) else one for one in given]
 
 
-def apart(values: Sequence[Value | Several], several: Sequence[bool], count: int) -> list[Value]:
+@overload
+def apart(values: Sequence[Value | Several], several: Sequence[bool], count: int) -> list[Value]: ...
+@overload
+def apart(values: Sequence[Array], several: Sequence[bool], count: int) -> list[Array]: ...
+def apart(values: Sequence[Any], several: Sequence[bool], count: int) -> list[Any]:
     """One after the other what `several` says has a value for each of `count` directions; what is the same for all as often."""
-    flat: list[Value] = []
+    flat: list[Any] = []
     for value, each in zip(values, several, strict=True):
         if not each:
             assert not isinstance(value, Several)
@@ -78,36 +80,40 @@ class Dependence:
         name = equation.primitive.name
         if name in SAME:
             return reads
-        if name not in PROGRAMS:
+        if name not in CALLS and name not in ("scan", "while", "cond"):
             return [True] * len(equation.outvars)
         params = parameters_of(equation)
+        if name in CALLS:
+            return self.results(opened(params["program"])[0], reads)
         if name == "scan":
             return self.of_scan(opened(params["program"])[0], reads, params["constants"], params["carry"])
         if name == "while":
             fixed = params["test_constants"], params["body_constants"]
             return self.of_while(opened(params["body"])[0], reads, *fixed)
-        if name == "cond":
-            branches = [self.results(opened(one)[0], reads[1:]) for one in params["branches"]]
-            return [reads[0] or any(each) for each in zip(*branches, strict=True)]
-        return self.results(opened(params["program"])[0], reads)
+        branches = [self.results(opened(one)[0], reads[1:]) for one in params["branches"]]
+        return [reads[0] or any(each) for each in zip(*branches, strict=True)]
 
     def of_scan(self, body: Any, reads: Sequence[bool], constants: int, carry: int) -> list[bool]:
         """Which of the carry and of the stacked results of a scan depend on the arguments that `reads` marks."""
-        carried = list(reads[constants : constants + carry])
-        while True:
-            results = self.results(body, [*reads[:constants], *carried, *reads[constants + carry :]])
-            wider = [one or other for one, other in zip(carried, results[:carry], strict=True)]
-            if wider == carried:
-                return [*carried, *results[carry:]]
-            carried = wider
+        first, series = reads[:constants], reads[constants + carry :]
+        return _settled(
+            reads[constants : constants + carry], lambda carried: self.results(body, [*first, *carried, *series])
+        )
 
     def of_while(self, body: Any, reads: Sequence[bool], test_constants: int, body_constants: int) -> list[bool]:
         """Which of the carry of a loop depend on the arguments that `reads` marks."""
-        first = test_constants + body_constants
-        carried = list(reads[first:])
-        while True:
-            results = self.results(body, [*reads[test_constants:first], *carried])
-            wider = [one or other for one, other in zip(carried, results, strict=True)]
-            if wider == carried:
-                return carried
-            carried = wider
+        first = reads[test_constants : test_constants + body_constants]
+        return _settled(
+            reads[test_constants + body_constants :], lambda carried: self.results(body, [*first, *carried])
+        )
+
+
+def _settled(start: Sequence[bool], round_of: Callable[[Sequence[bool]], list[bool]]) -> list[bool]:
+    """What a round of a loop gives, its carry first, once no further round makes more of the carry depend on the direction."""
+    carried = list(start)
+    while True:
+        results = round_of(carried)
+        wider = [one or other for one, other in zip(carried, results, strict=False)]
+        if wider == carried:
+            return [*carried, *results[len(carried) :]]
+        carried = wider

@@ -14,7 +14,7 @@ from collections.abc import Callable, Hashable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from threading import Event
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, cast, get_args
 
@@ -75,7 +75,12 @@ class Coming:
 def by_machine_code() -> bool:
     """Whether "auto" means machine code here, where nothing stands in the way of a single program."""
     engine = engine_of()
-    return engine == "native" or (engine == "auto" and not WINDOWS and importlib.util.find_spec("llvmlite") is not None)
+    return engine == "native" or (engine == "auto" and not WINDOWS and _has_llvmlite())
+
+
+@cache
+def _has_llvmlite() -> bool:
+    return importlib.util.find_spec("llvmlite") is not None
 
 
 class Program:
@@ -155,9 +160,9 @@ class Program:
         `devices`, `block` and `room` (runs that one compilation has room for) are of XLA, `threads` of machine code.
         """
         check_arguments(self._made_for, self._names, model, own, self._along)
-        if self.native is None and self._along.names:
-            return Coming(partial(self._by_xla, model, own))
         if self.native is None:
+            if self._along.names:
+                return Coming(partial(self._by_xla, model, own))
             return Coming(xla.started(self._function, model, own, devices, block, room))
         pool, stop = ThreadPoolExecutor(1), Event()
         try:

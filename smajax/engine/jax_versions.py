@@ -78,6 +78,8 @@ TABLE: Mapping[str, Mapping[str, tuple[Reading, ...]]] = {
 
 # What says something to XLA, or to a derivative, and changes nothing.
 SAME = ("optimization_barrier", "name", "random_wrap", "random_unwrap")
+# What stands for a program of its own, once.
+CALLS = {name for name, own in TABLE.items() if "program" in own and name != "scan"}
 # Parameters of arithmetic that say where a result lies, or what its type already says.
 OF_PLACE_OR_TYPE = {"sharding", "out_sharding", "weak_type", "new_dtype"}
 

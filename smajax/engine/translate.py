@@ -16,7 +16,7 @@ from smajax.engine.loop import Loop
 from smajax.engine.memory import in_memory, in_registers, row
 from smajax.engine.phases import laid_out
 from smajax.engine.text import NAME, Array, Text, Unsupported, scalar_type
-from smajax.engine.translation import Translation, constants, repeated
+from smajax.engine.translation import Translation, constants
 from smajax.engine.values import SMALL, Filled, Stored, Value, held
 
 VECTORS = 6  # of a group: while one waits for a result others go on
@@ -74,7 +74,7 @@ def translate(
             continue
         whole = Stored(pointers[-1][0], argument.shape, argument.dtype, own=False)
         shared.append(in_registers(text, whole) if whole.size <= SMALL else whole)
-    results = tuple(repeated([array_of(aval) for aval in program.out_avals], several, directions))
+    results = tuple(apart([array_of(aval) for aval in program.out_avals], several, directions))
     outputs = []
     for number in range(len(results)):
         slot = text.assign(f"getelementptr inbounds ptr, ptr %results, i64 {number}")

@@ -27,16 +27,13 @@ from smajax.engine.by_numpy import computed
 from smajax.engine.directions import Dependence, Several, any_several, apart, of_direction, together
 from smajax.engine.equations import Read, Step, array_of, note, read_of, steps_of
 from smajax.engine.expansions import EXPANSIONS
-from smajax.engine.jax_versions import SAME, TABLE, expanded, opened
+from smajax.engine.jax_versions import CALLS, SAME, expanded, opened
 from smajax.engine.loop import Loop
 from smajax.engine.memory import in_memory, in_registers, mapped, row, write
 from smajax.engine.text import Array, Lane, Text, Unsupported, scalar_type
 from smajax.engine.values import SMALL, Filled, Held, Stored, Value, held, is_known, name_of, size_of
 
 OF_TWO_KINDS = ("select_n", "convert_element_type", "bitcast_convert_type")
-CALLS = {
-    name for name, own in TABLE.items() if "program" in own and name != "scan"
-}  # they stand for a program of their own
 Prepared = tuple[tuple[Step, ...], list[Read]]  # the equations of a program, and what it ends with
 
 
@@ -112,22 +109,17 @@ class Translation:
 
     def equation(self, step: Step, given: list[Several | Value]) -> list[Several | Value]:
         name, params = step.name, step.params
-        operation, out = step.operation, step.out
-        if operation is not None and out is not None and any_several(given):
-            # Nearly all there is of a derivative.
-            step.check()
-            numbers = range(self.directions)
-            return [Several([self.elementwise(name, params, of_direction(given, k), operation, out) for k in numbers])]
-        if name in SAME:
-            return given
-        if name in CALLS:
-            return self.closed(params["program"], given)
-        if name == "scan":
-            return self.scan(params, given, [array_of(one.aval) for one in step.equation.outvars])
-        if name == "while":
-            return self.repeat(params, given)
-        if name == "cond":
-            return self.choice(params, given)
+        if step.operation is None:  # no arithmetic, which nearly all is
+            if name in SAME:
+                return given
+            if name in CALLS:
+                return self.closed(params["program"], given)
+            if name == "scan":
+                return self.scan(params, given, [array_of(one.aval) for one in step.equation.outvars])
+            if name == "while":
+                return self.repeat(params, given)
+            if name == "cond":
+                return self.choice(params, given)
         if any_several(given):
             each = [self.operation(step, of_direction(given, k)) for k in range(self.directions)]
             return [Several(one) for one in zip(*each, strict=True)]
@@ -228,8 +220,8 @@ class Translation:
         several = self.dependence.of_scan(jaxpr, reads, fixed, carry)
         start = [self.carried(one) for one in apart(given[fixed : fixed + carry], several[:carry], count)]
         of_series = reads[fixed + carry :]
-        kinds = repeated([array_of(one.aval) for one in jaxpr.invars[fixed + carry :]], of_series, count)
-        stacked = repeated(out[carry:], several[carry:], count)
+        kinds = apart([array_of(one.aval) for one in jaxpr.invars[fixed + carry :]], of_series, count)
+        stacked = apart(out[carry:], several[carry:], count)
         if length == 0:
             raise Unsupported("a loop of no steps")
         series = [
@@ -301,10 +293,6 @@ class Translation:
             for of in zip(*result, strict=True)
         ]
         return together(chosen, several, self.directions)
-
-
-def repeated(kinds: Sequence[Array], several: Sequence[bool], count: int) -> list[Array]:
-    return [kind for kind, each in zip(kinds, several, strict=True) for _ in range(count if each else 1)]
 
 
 def _of_all(value: Several | Value, what: str) -> Value:

@@ -97,6 +97,11 @@ def directions_of(problem: Problem) -> int:
     return ALONG_MANY if problem.batch.output.shape[-1] >= MANY_SAMPLES else ALONG_FEW
 
 
+def runs_of_derivatives(problem: Problem, points: int, directions: int) -> int:
+    """How many runs of a fit's program give the derivatives at so many points along so many directions."""
+    return points * -(-directions // directions_of(problem))
+
+
 def _program(problem: Problem, function: Function, run: _Run, names: Collection[str], beside: bool = False) -> Program:
     """`function` of a run of the problem, compiled quickly or not by what it is made for, the length of a run."""
     quickly = problem.batch.output.shape[-1] <= SHORT
@@ -119,8 +124,7 @@ def _of_run(problem: Problem, points: np.ndarray, run: int) -> np.ndarray:
 
 def chunks(problem: Problem, count: int, directions: int = 1) -> list[slice]:
     """`count` points, with so many directions each, cut so that the series of a part take at most `MAX_BYTES`."""
-    each = directions_of(problem)
-    series = -(-directions // each) * each
+    series = runs_of_derivatives(problem, 1, directions) * directions_of(problem)
     at_once = max(1, MAX_BYTES // max(series * problem.measured.nbytes, 1))
     return [slice(start, start + at_once) for start in range(0, count, at_once)]
 
@@ -185,8 +189,7 @@ def predicted_and_derivatives(
     count, directions = tangents.shape[:2]
     if directions == 0:
         return predicted_at(problem, points), np.zeros((count, 0, *problem.batch.output.shape))
-    each = directions_of(problem)
-    groups = -(-directions // each)
+    each, groups = directions_of(problem), runs_of_derivatives(problem, 1, directions)
     filled = np.zeros((count, groups * each, tangents.shape[2]))
     filled[:, :directions] = tangents
     pairs = np.repeat(points, groups, axis=0), filled.reshape(count * groups, each, -1)
@@ -199,11 +202,6 @@ def predicted_and_derivatives(
     values = [value[::groups, 0] for value, _ in results]
     derivatives = [one.reshape(count, groups * each, *one.shape[2:])[:, :directions] for _, one in results]
     return np.concatenate(values, axis=1), np.concatenate(derivatives, axis=2)
-
-
-def runs_of_derivatives(problem: Problem, points: int, directions: int) -> int:
-    """How many runs of a fit's program give the derivatives at so many points along so many directions."""
-    return points * -(-directions // directions_of(problem))
 
 
 def slopes_at(problem: Problem, points: Sequence[np.ndarray], names: Sequence[str]) -> np.ndarray:

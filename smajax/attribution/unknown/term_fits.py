@@ -37,9 +37,8 @@ PASSES = 2  # the error of a sample is first that of the model without a term, t
 LARGEST = 2.0  # size of a wave: each is then at most as large as the largest function that is sought
 MUCH = 1e4  # samples times directions of the derivative, of one fit
 AS_NOISE = 0.9  # of residuals that have nothing to do with a term would give it more: beyond that it is not fitted
-HARDLY_HELD = (
-    0.5  # of the squares that are left no value of the parameters would take away: their priors hardly hold them
-)
+# Of the squares that are left, no value of the parameters would take away: beyond that their priors hardly hold them.
+HARDLY_HELD = 0.5
 TINY = 1e-300
 TOGETHER = 3  # terms in a program, which computes mostly the model that they are all beside
 REACH = 10.0  # in log odds behind the likeliest, within which a term is fitted again with the smaller error
