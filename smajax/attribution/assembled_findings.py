@@ -62,21 +62,22 @@ def findings_of(
     base, final = outcome.base, outcome.final
     runs, residual_before, residual_after = compared
     setting.progress(Stage(WRITING, 0.0))
-    error_of = outcome.search.error_of
+    search = outcome.search
+    error_of = search.error_of
     before = parameters_found(job, setting, base, context.start, error_of(()))
     after = parameters_found(job, setting, final, context.start, error_of(final.effects)) if final.effects else before
-    effects = effects_found(job, setting, final, after, outcome.search.detectable or None, scored=not brief)
+    effects = effects_found(job, setting, final, after, search.detectable or None, search.traced, scored=not brief)
     average = Averaged()
     if len(job.fit_runs) > 1 and not brief:  # else none can be left out, which the band is made of
         clocks = {run.name: len(run.time) for run in experiment.runs}
-        average = averaged(setting, outcome.search, final, every_run(job), base, clocks)
+        average = averaged(setting, search, final, every_run(job), base, clocks)
         runs = with_averages(runs, average.runs)
     states = {run.name: run.states for run in runs}
-    extended_model = base_model = saved_model(job, setting, outcome.search, final, after, average, states)
+    extended_model = base_model = saved_model(job, setting, search, final, after, average, states)
     if final.effects:
         states = fit_run_states(job, setting, base)
-        base_model = saved_model(job, setting, outcome.search, base, before, None, states)
-    mistaken = () if brief else confounders(outcome.search, setting, final, job.fit_runs)
+        base_model = saved_model(job, setting, search, base, before, None, states)
+    mistaken = () if brief else confounders(search, setting, final, job.fit_runs)
     setting.progress(Stage(WRITING, 1.0))
     verdict = verdict_of(final.effects, residual_after, setting.config)
     lacking, superseded = unknown_terms_of(context, outcome, verdict)

@@ -47,7 +47,7 @@ def confounders(search: JointSearch, setting: Search, model: Model, runs: Sequen
     in_place = {effect: list(_in_place_of(search, own, effect, error)) for effect in own}
     others = {other for likened in in_place.values() for other, _ in likened}
     looked_for = search.detectable or tuple(search.joint.coefficients)  # by the search's programs
-    traces = traces_at(search.joint, fitted, search.extent, (*looked_for, *others), looked_for)
+    traces = traces_at(search.joint, fitted, search.extent, (*looked_for, *others), looked_for, search.traced)
     found: list[Confounder] = []
     likely: list[tuple[int, FittedModel]] = []  # (place in `found`, model with a confounder that runs may separate)
     for effect, likened in in_place.items():
@@ -166,7 +166,8 @@ def separating_runs(
     if not candidates or not others:
         return [("", float("nan"))] * len(others)
     # Values of single runs, which come last, are in the candidates already.
-    first, *rest = predicted_at(there, [model.values[index][: len(there.names)] for model in (one, *others)])
+    points = [model.values[index][: len(there.names)] for model in (one, *others)]
+    first, *rest = predicted_at(there, points, fitted=False)
     found = []
     for second in rest:
         difference = there.by_run(there.centred(first - second))

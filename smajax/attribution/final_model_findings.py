@@ -9,6 +9,7 @@ import numpy as np
 
 from smajax.attribution.declared_priors import NONE_DECLARED
 from smajax.attribution.findings import CoefficientFinding, EffectFinding, ParameterFinding
+from smajax.attribution.fit_programs import Effects
 from smajax.attribution.job import Job
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.leave_one_run_out import jackknife_error
@@ -85,14 +86,15 @@ def effects_found(
     final: Model,
     after: ParametersFound,
     looked_for: Sequence[str] | None = None,
+    compiled: Sequence[Effects] = (),
     scored: bool = True,
 ) -> tuple[EffectFinding, ...]:
     """Every candidate with its evidence: added ones first, the strongest of them at the head, then the likeliest.
 
-    `looked_for`: by the search; None: all. `scored`: with the score of each that was not added.
+    `looked_for`: by the search; None: all. `compiled`: as of `traces_at`. `scored`: with the score of each that was not added.
     """
     left = [name for name in job.candidates if name not in final.effects] if scored else []
-    last = {score.effects[0]: score for score in scores_at(setting, final, left, looked_for)} if left else {}
+    last = {score.effects[0]: score for score in scores_at(setting, final, left, looked_for, compiled)} if left else {}
     fitted = {parameter.name: parameter for parameter in after.parameters}
     joint = setting.joint(final.effects)
     findings = []

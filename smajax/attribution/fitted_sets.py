@@ -32,6 +32,7 @@ class JointSearch:
     excluded: frozenset[str] = frozenset()  # candidates that no set may have
     detectable: tuple[str, ...] = ()
     programs: tuple[tuple[str, ...], ...] = ()  # effects that each program of the fits so far carries
+    traced: tuple[tuple[str, ...], ...] = ()  # and each of the linear models so far
     winner: tuple[str, ...] = ()  # effects of the likeliest model when the search had ended
     rounds_before: int = 0  # of an earlier search, from whose models this one begins
     thorough: bool = True  # ends only where no effect of the likeliest model can be removed or replaced

@@ -153,7 +153,8 @@ def _effects(search: JointSearch, subset: Subset) -> tuple[str, ...]:
 
 def _linear(search: JointSearch, present: FittedModel, error: float) -> tuple[LinearModel, Traces]:
     """The linear model at the present fit, searched from no effects and from the present ones."""
-    traces = traces_at(search.joint, present, search.extent, search.detectable or None)
+    traces = traces_at(search.joint, present, search.extent, search.detectable or None, None, search.traced)
+    search.traced = traces.compiled
     if not search.detectable:
         found = detectable(search.joint, traces, search.noise)
         search.detectable = tuple(effect for effect in found if effect not in search.excluded)
@@ -341,17 +342,17 @@ def _asked(
     `settings`: what `chosen` depends on beside its arguments. Cached: tracing the programs of the linear model takes most of the time
     in which a search that resumes comes to where it was.
     """
-    cache, joint, candidates = search.settings.cache, search.joint, search.detectable or None
+    cache, joint, candidates, before = search.settings.cache, search.joint, search.detectable or None, search.traced
     key = key_of_round(search, present, error, chosen.__name__, *settings)
-    known = loaded_round(cache, key, lambda: traces_at(joint, present, search.extent, candidates))
+    known = loaded_round(cache, key, lambda: traces_at(joint, present, search.extent, candidates, None, before))
     if known is not None:
-        search.detectable, search.programs = known.detectable, known.programs
+        search.detectable, search.programs, search.traced = known.detectable, known.programs, known.traced
         return known
     linear, traces = _linear(search, present, error)
     sets = chosen(search, linear, present, error)
     begun = _begun(search, sets, linear, traces, error)
     effects = tuple(_effects(search, one) for one in sets)
-    asked = Asked(effects, tuple(begun), search.detectable, search.programs, lambda: traces)
+    asked = Asked(effects, tuple(begun), search.detectable, search.programs, search.traced, lambda: traces)
     save_round(cache, key, asked)
     return asked
 

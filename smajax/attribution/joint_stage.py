@@ -141,7 +141,7 @@ class _Stage:
         """
         if len(found.effects) < MANY or leaves_noise(self.setting, found):
             return None
-        asked = self._asked(search)
+        asked = self._asked(search, found)
         if asked.fits is None or not self._likelier(search, found, asked.fits.fitted[:1]):
             return None
         named = asked.found.likeliest
@@ -191,7 +191,7 @@ class _Stage:
             len(found.effects) < self.setting.config.many_effects and leaves_noise(self.setting, found)
         ):
             return None
-        fits = self._asked(search).fits
+        fits = self._asked(search, found).fits
         functions = self._likelier(search, found, () if fits is None else fits.fitted)
         other = self._one_effect(search, found, functions) if functions else None
         return other or (self._one_of_all(search, found) if len(found.effects) >= MANY else None)
@@ -204,10 +204,10 @@ class _Stage:
         likelier = self._likelier(search, found, [*described, *likeliest_alone(search, every, found)])
         return likelier[0] if likelier else None
 
-    def _asked(self, search: JointSearch) -> AskedFor:
+    def _asked(self, search: JointSearch, found: FittedModel) -> AskedFor:
         """Unknown functions beside the base model, whose values of presets are free in them as well."""
         if not self.asked:
-            self.asked.append(asked_for(self.setting, search.fitted[()]))
+            self.asked.append(asked_for(self.setting, search.fitted[()], found.effects))
         search.lacking = self.asked[0]
         return self.asked[0]
 
@@ -242,7 +242,7 @@ class _Stage:
         `base`: values (P,) of the base model; None: those of `search`. Unknowns that `search` did not have begin there as well.
         """
         again = self.joint_search(self.setting.presets)
-        again.programs = search.programs
+        again.programs, again.traced = search.programs, search.traced
         starts = self._starts(search, found, most, again.excluded)
         if base is not None:
             # What is held now lies where the base model has it.

@@ -40,7 +40,9 @@ def checked(
             reasons[effects] = StepDependent(" + ".join(jumping), kept)
     if setting.held_out is not None:
         left = [one for effects, one in doubted.items() if effects not in reasons]
-        reasons |= _on_held_out(setting, search, base, left)
+        # By the program of the average.
+        every = [effect for one, _ in models for effect in one.effects]
+        reasons |= _on_held_out(setting, search, base, left, every)
     rest = [(one, weight) for one, weight in models if one.effects not in reasons]
     total = sum(weight for _, weight in rest)
     dropped = (
@@ -50,14 +52,13 @@ def checked(
 
 
 def _on_held_out(
-    setting: Search, search: JointSearch, base: Model, models: Sequence[FittedModel]
+    setting: Search, search: JointSearch, base: Model, models: Sequence[FittedModel], every: Sequence[str]
 ) -> dict[tuple[str, ...], HeldOutWorse]:
     """Those of `models` that predict the held-out runs worse than the base model, or than without one of their effects, beyond chance."""
     if not models:
         return {}
     simpler = [_without_one(search, one) for one in models]
     values = [base.values, *(one.values for one in models), *(one.values for one in simpler if one is not None)]
-    every = [effect for one in models for effect in one.effects]
     owners = held_out_owners(setting)
     basic, *others = held_out_residuals(setting, every, values)
     own, nested = others[: len(models)], iter(others[len(models) :])

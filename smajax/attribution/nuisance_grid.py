@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from smajax.attribution.fit_programs import Effects, carrying
 from smajax.attribution.model_fits import Model, Search, nudged
 from smajax.attribution.score_test import Score, ranked, samples_per_independent, score_of, switches, without
 from smajax.attribution.traces import by_program, far_from, from_coarse_to_fine
@@ -38,14 +39,16 @@ def scanned(
     fitted: Sequence[str],
     present: Sequence[str] = (),
     looked_for: Sequence[str] | None = None,
+    compiled: Sequence[Effects] = (),
 ) -> Scanned:
     """Misfit and its derivatives at `values` (P,) of a model with the effects `present`, where `fitted` are the loose parameters.
 
-    `effects`, which are off, are each at the place whose trace promises most beside what the fitted parameters absorb. `looked_for`: as of
-    `by_program`.
+    `effects`, which are off, are each at the place whose trace promises most beside what the fitted parameters absorb. `looked_for`, `compiled`: as of
+    `traces_at`.
     """
     programs = by_program(effects, looked_for)
-    restricted = [setting.restricted((*present, *together)) for together in programs]
+    samples = setting.problem.measured.shape[-1]
+    restricted = [setting.restricted(carrying((*present, *together), compiled, samples)) for together in programs]
     own, index = setting.restricted(present)
     misfit = misfits(own, [values[index]])[0] / np.asarray(own.noise)
     slots = [slots for _, slots in restricted]
@@ -118,14 +121,18 @@ def _at_places(
 
 
 def scores_at(
-    setting: Search, model: Model, left: Sequence[str], looked_for: Sequence[str] | None = None
+    setting: Search,
+    model: Model,
+    left: Sequence[str],
+    looked_for: Sequence[str] | None = None,
+    compiled: Sequence[Effects] = (),
 ) -> list[Score]:
     """Score tests of the effects not yet in `model`, at its fit, the largest gain first; having looked at several places counts against one.
 
-    `looked_for`: as of `by_program`.
+    `looked_for`, `compiled`: as of `traces_at`.
     """
     loose = setting.loose(model.effects, model.values)
-    looked = scanned(setting, model.values, left, loose, model.effects, looked_for)
+    looked = scanned(setting, model.values, left, loose, model.effects, looked_for, compiled)
     scores = ranked(looked.at, loose, left, setting.bounds)
     return [
         dataclasses.replace(score, p_value=min(1.0, score.p_value * looked.looks.get(score.effects[0], 1)))

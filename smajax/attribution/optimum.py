@@ -14,6 +14,7 @@ from smajax.attribution.laplace_evidence import FittedModel, fitted_model
 from smajax.attribution.leave_one_run_out import predicting
 from smajax.attribution.model_fits import Model, Search, Start
 from smajax.attribution.reasons import NoiseWithoutEffects
+from smajax.attribution.side_by_side import program_compiled
 from smajax.core.whiteness import on_samples
 from smajax.fit.levenberg_marquardt import levenberg_marquardt
 
@@ -66,9 +67,9 @@ def leaves_noise(setting: Search, model: FittedModel) -> bool:
     return setting.all_noise(on_samples(model.residual, mask), mask)
 
 
-def refined(search: JointSearch, model: FittedModel, error: float) -> FittedModel:
+def refined(search: JointSearch, model: FittedModel, error: float, program: Sequence[str] | None = None) -> FittedModel:
     """`at_optimum`, among the models that the search has fitted."""
-    best = at_optimum(search, model, error)
+    best = at_optimum(search, model, error, program)
     if best is not model:
         search.fitted[model.effects] = best
     return best
@@ -123,7 +124,8 @@ def without(search: JointSearch, model: Model | FittedModel, effect: str, error:
     if fitted is None:
         fitted = fitted_model(search.joint, rest, search.joint.without(model.values, rest), model.effects)
         search.fitted[rest] = fitted
-    return refined(search, fitted, error)  # in the search it may have ended early
+    # In the search it may have ended early. The model itself has a program of its own, for what is said of it later.
+    return refined(search, fitted, error, program_compiled(search, rest, model.effects))
 
 
 def as_model(search: JointSearch, fitted: FittedModel, error: float) -> Model:

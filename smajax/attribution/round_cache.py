@@ -22,6 +22,7 @@ class Asked(NamedTuple):
     begun: tuple[BegunFit, ...]
     detectable: tuple[str, ...]  # effects that the runs can show
     programs: tuple[tuple[str, ...], ...]  # effects that each program of the fits so far carries
+    traced: tuple[tuple[str, ...], ...]  # and each of the linear models so far
     traces: Callable[[], Traces]  # of the linear model, where it is asked for again
 
 
@@ -36,6 +37,7 @@ def key_of_round(search: JointSearch, present: FittedModel, error: float, *setti
         sorted(search.excluded),
         search.detectable,
         search.programs,
+        search.traced,
         list(search.fitted),
         search.trials,
     )
@@ -57,7 +59,8 @@ def loaded_round(cache: ResultCache, key: str, traces: Callable[[], Traces]) -> 
     def sets(named: list[list[str]]) -> tuple[tuple[str, ...], ...]:
         return tuple(map(tuple, named))
 
-    return Asked(sets(words["sets"]), tuple(begun), tuple(words["detectable"]), sets(words["programs"]), traces)
+    programs = sets(words["programs"]), sets(words["traced"])
+    return Asked(sets(words["sets"]), tuple(begun), tuple(words["detectable"]), *programs, traces)
 
 
 def save_round(cache: ResultCache, key: str, asked: Asked) -> None:
@@ -67,6 +70,7 @@ def save_round(cache: ResultCache, key: str, asked: Asked) -> None:
         "begun": [(one.effects, dict(one.width_factors)) for one in asked.begun],
         "detectable": asked.detectable,
         "programs": asked.programs,
+        "traced": asked.traced,
     }
     values = np.asarray([one.values for one in asked.begun])
     cache.save(key, {"words": np.asarray(json.dumps(words)), "values": values})

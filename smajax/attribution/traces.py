@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from smajax.attribution.exclusive_effects import of_groups
+from smajax.attribution.fit_programs import Effects, carrying
 from smajax.attribution.joint_parameters import NUDGE, JointParameters, residual_and_columns
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.fit.integration import with_integration
@@ -42,6 +43,7 @@ class Traces:
     columns: Mapping[str, np.ndarray]  # (n,), by unknowns and coefficients
     variants: Mapping[Variant, Mapping[str, np.ndarray]]  # columns of each variant's coefficients
     places: Mapping[Variant, Mapping[str, float]]  # values there, by full name
+    compiled: tuple[Effects, ...] = ()  # effects that each program of traces so far carries
 
 
 def traces_at(
@@ -50,17 +52,20 @@ def traces_at(
     extent: Extent,
     candidates: Sequence[str] | None = None,
     looked_for: Sequence[str] | None = None,
+    compiled: Sequence[Effects] = (),
 ) -> Traces:
     """Residual of a fitted model and derivatives there; effects that are off are switched on by `NUDGE` for theirs.
 
-    `candidates`: effects that are looked at beside those of the model; None: all. `looked_for`: as of `by_program`. Derivatives by one step of the integration a
+    `candidates`: effects that are looked at beside those of the model; None: all. `looked_for`: as of `by_program`. `compiled`: effects that programs of traces carry which are compiled already. Derivatives by one step of the integration a
     sample, which only say which sets of effects are worth a fit, unless that is far off.
     """
     values, present = model.values, model.effects
     among = joint.coefficients if candidates is None else joint.ordered((*present, *candidates))
     absent = [effect for effect in among if effect not in present]
     programs = by_program(absent, looked_for)
-    restricted = [joint.restricted((*present, *together)) for together in programs]
+    samples = joint.problem.measured.shape[-1]
+    carried = [carrying(joint.ordered((*present, *together)), compiled, samples) for together in programs]
+    restricted = [joint.restricted(one) for one in carried]
     shared = joint.free([effect for effect in among if effect in present])
     for problems in from_coarse_to_fine([problem for problem, _ in restricted]):
         residual, columns, variants, places = _traced(joint, values, shared, programs, problems, restricted, extent)
@@ -69,7 +74,8 @@ def traces_at(
     by_themselves = {
         Variant(effect, -1): {name: columns[name] for name in joint.coefficients[effect]} for effect in among
     }
-    return Traces(np.asarray(values), present, model.residual, columns, {**by_themselves, **variants}, places)
+    every = tuple(dict.fromkeys([*compiled, *carried]))
+    return Traces(np.asarray(values), present, model.residual, columns, {**by_themselves, **variants}, places, every)
 
 
 def from_coarse_to_fine(problems: Sequence[Problem]) -> Iterator[list[Problem]]:

@@ -92,7 +92,7 @@ def unlimited(integration: Integration) -> Integration:
     """The same for a run that is no trial point of a fit: as many tries as it takes, by the same program."""
     if integration.most_tries is None:
         return integration
-    return dataclasses.replace(integration, most_tries=jnp.asarray(jnp.inf))
+    return dataclasses.replace(integration, most_tries=jnp.full_like(integration.most_tries, jnp.inf))
 
 
 def limited_near(problem: Problem, values: np.ndarray) -> Integration:

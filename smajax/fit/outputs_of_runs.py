@@ -73,7 +73,14 @@ def _predict(run: _Run, values: jax.Array) -> jax.Array:
     system = set_vector(run.system, run.shared, values[:count])
     overrides = jnp.concatenate([run.overrides, values[count:]])
     return predict_run(
-        system, run.inputs, overrides, (*run.override_names, *run.per_run), run.dt, run.outputs, run.integration
+        system,
+        run.inputs,
+        overrides,
+        (*run.override_names, *run.per_run),
+        run.dt,
+        run.outputs,
+        run.integration,
+        once=True,
     )
 
 
@@ -129,13 +136,13 @@ def chunks(problem: Problem, count: int, directions: int = 1) -> list[slice]:
     return [slice(start, start + at_once) for start in range(0, count, at_once)]
 
 
-def predicted_at(problem: Problem, points: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:
-    """Predicted sensor outputs at points (M, P): (M, series, N), SI."""
+def predicted_at(problem: Problem, points: Sequence[np.ndarray] | np.ndarray, fitted: bool = True) -> np.ndarray:
+    """Predicted sensor outputs at points (M, P): (M, series, N), SI. `fitted`: whether the problem is, so that a program with derivatives is there."""
     rows = np.asarray(points, dtype=float)
     parts = chunks(problem, len(rows))
     if len(parts) > 1:
-        return np.concatenate([predicted_at(problem, rows[part]) for part in parts])
-    if len(rows) <= FEW:
+        return np.concatenate([predicted_at(problem, rows[part], fitted) for part in parts])
+    if fitted and len(rows) <= FEW:
         zero = np.zeros((len(rows), 1, rows.shape[1]))
         return predicted_and_derivatives(problem, rows, zero)[0]
     outputs = []

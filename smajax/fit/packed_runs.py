@@ -119,10 +119,11 @@ def predict_run(
     dt: Scalar | float,
     outputs: Sequence[str],
     integration: Integration,
+    once: bool = False,
 ) -> Float[Array, "output time"]:
-    """Predicted sensor outputs of one run, with its `values` of `names`."""
+    """Predicted sensor outputs of one run, with its `values` of `names`. `once`: as of `simulate`."""
     here, initial = _started(system, names, values, inputs)
-    run = simulate(here, inputs, dt, initial, integration)
+    run = simulate(here, inputs, dt, initial, integration, once=once)
     return jnp.stack([sensor_output(here, run, name) for name in outputs])
 
 

@@ -138,6 +138,8 @@ def simulate(
     dt: Scalar | float = DEFAULT_STEP,
     initial: State | None = None,
     integration: Integration = ONE_STEP,
+    *,
+    once: bool = False,
 ) -> Trajectory:
     """Simulate over the samples of `inputs`, each of shape (n,), SI, `dt` seconds apart.
 
@@ -146,13 +148,14 @@ def simulate(
     `UnsolvedWarning` says so of a run in double precision that is not traced). `initial` defaults to rest with the first
     inputs. Raises ValueError for missing or ill-shaped inputs, for one that is not finite and a parameter out of its bounds, unless the value is not known yet (`jit`, `vmap`, `grad`).
     `integration`: how finely between two samples, by default one step, for what is traced cannot look at its own error:
-    `compiled.chosen_integration` looks before. Error-controlled steps have derivatives in forward mode alone.
+    `compiled.chosen_integration` looks before. Error-controlled steps have derivatives in forward mode alone. `once`: the run will be differentiated once at most, which is a
+    tenth quicker; derivatives of the second order are wrong then.
     """
     check_inputs(system, inputs)
     check_scalars(system, dt, initial)
     check_bounds(system)
     series = acting_inputs(system, {name: jnp.asarray(values, dtype=float) for name, values in inputs.items()}, dt)
-    run = trajectory_of(stepper_of(system, dt, integration), series, first_state(system, series, initial))
+    run = trajectory_of(stepper_of(system, dt, integration, once), series, first_state(system, series, initial))
     warn_of_unsolved(run)
     return run
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from functools import cache
+from functools import cache, partial
 from importlib import import_module
 from types import SimpleNamespace
 from typing import ClassVar
@@ -135,7 +135,9 @@ def test_the_spline_equals_de_boors() -> None:
     share = np.linspace(0.0, 1.0, 101)
     expected = BSpline(knots, WAVES @ coefficients, 3)(share)
     np.testing.assert_allclose(design(share) @ coefficients, expected, atol=1e-12)
-    found = spline(powers_of([jnp.asarray(one) for one in coefficients]), jnp.asarray([-0.5, *share, 2.0]))
+    found = jax.vmap(partial(spline, powers_of([jnp.asarray(one) for one in coefficients])))(
+        jnp.asarray([-0.5, *share, 2.0])
+    )
     np.testing.assert_allclose(found, [expected[0], *expected, expected[-1]], atol=1e-12)
 
 

@@ -130,9 +130,9 @@ def _explains(with_it: float, without: float, noise: float) -> bool:
     return explained_share(with_it, without, noise) >= EXPLAINED
 
 
-def asked_for(setting: Search, model: Model | FittedModel) -> AskedFor:
-    """Unknown terms beside `model`."""
-    fits = fits_with_terms(setting, model)
+def asked_for(setting: Search, model: Model | FittedModel, likely: Sequence[str] = ()) -> AskedFor:
+    """Unknown terms beside `model`. `likely`: as of `fits_with_terms`."""
+    fits = fits_with_terms(setting, model, likely)
     return AskedFor(fits, Lacking if fits is None else partial(learnt, setting, fits))
 
 

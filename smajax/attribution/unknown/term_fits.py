@@ -23,7 +23,7 @@ from smajax.core.progress import Stage
 from smajax.data.experiment.record import Prior
 from smajax.fit.integration import limited_near, with_integration
 from smajax.fit.levenberg_marquardt import FitSettings
-from smajax.fit.outputs_of_runs import made_ready
+from smajax.fit.outputs_of_runs import SHORT, made_ready
 from smajax.fit.sensitivity import sensitivity
 from smajax.fit.starts import nearest
 from smajax.model.effects.candidate import PRIOR_ODDS
@@ -41,15 +41,18 @@ AS_NOISE = 0.9  # of residuals that have nothing to do with a term would give it
 HARDLY_HELD = 0.5
 TINY = 1e-300
 TOGETHER = 3  # terms in a program, which computes mostly the model that they are all beside
+FEW_LIKELY = 2  # effects that a program of the terms carries for later: each makes its runs slower now
 REACH = 10.0  # in log odds behind the likeliest, within which a term is fitted again with the smaller error
 
 
-def with_terms(setting: Search, final: Model | FittedModel) -> tuple[Search, np.ndarray, Sought]:
+def with_terms(
+    setting: Search, final: Model | FittedModel, carried: Sequence[str] = ()
+) -> tuple[Search, np.ndarray, Sought]:
     """(search among the terms that the runs can show, the final model's values in its order, what is sought).
 
-    One model carries them all, so that one compiled program serves the screening, every fit and every left-out run.
+    One model carries them all, so that one compiled program serves the screening, every fit and every left-out run. `carried`: effects that it has as well, off.
     """
-    plain, index = setting.restricted(final.effects)
+    plain, index = setting.restricted((*final.effects, *carried))
     system = plain.system_at(jnp.asarray(final.values[index]))
     found = sought(system, plain.with_own_values(final.values[index]))
     names = tuple(term.effect_name for term in found.terms)
@@ -125,17 +128,19 @@ class TermFits:
         return model.log_evidence(error**2) - self.none.log_evidence(error**2)
 
 
-def fits_with_terms(setting: Search, final: Model | FittedModel) -> TermFits | None:
+def fits_with_terms(setting: Search, final: Model | FittedModel, likely: Sequence[str] = ()) -> TermFits | None:
     """The terms that promise most, each fitted beside `final`; those that are `REACH` behind the likeliest are left out.
 
-    None where none promises anything.
+    None where none promises anything. `likely`: effects beside which terms are likely to be asked for as well. Of short runs the program that screens them carries these: it is then there.
     """
-    search, values, found = with_terms(setting, final)
+    short = setting.problem.measured.shape[-1] <= SHORT and len(likely) <= FEW_LIKELY
+    carried = tuple(likely) if short else ()
+    search, values, found = with_terms(setting, final, carried)
     if not search.candidates:
         return None
     search.progress(Stage("looking for the equation that lacks something", 0.0))
     scores, share = screened(search, values)
-    joint = joint_with_terms(setting, search, final)
+    joint = joint_with_terms(setting, search, (*final.effects, *carried))
     none = fitted_model(joint, final.effects, values, tuple(joint.coefficients))
     error = least_error(setting, [none])
     # Where priors hold parameters off what the runs ask of them, a score test says little of a fit.
@@ -162,9 +167,9 @@ def fits_with_terms(setting: Search, final: Model | FittedModel) -> TermFits | N
     return TermFits(search, found, joint, none, tuple(fitted), gains, program_of)
 
 
-def joint_with_terms(setting: Search, search: Search, final: Model | FittedModel) -> JointParameters:
-    """Parameters of models with the effects of `final` and one of the terms of `search`, with their priors."""
-    plain = setting.joint(final.effects)
+def joint_with_terms(setting: Search, search: Search, effects: Sequence[str]) -> JointParameters:
+    """Parameters of models with some of `effects` and one of the terms of `search`, with their priors."""
+    plain = setting.joint(effects)
     own = {term: tuple(search.coefficients(term)) for term in search.candidates}
     width = CoefficientPrior(0.0, setting.config.term_prior_sigma, False)
     return JointParameters(

@@ -11,6 +11,7 @@ from typing import ClassVar, Self
 
 import equinox as eqx
 import jax.numpy as jnp
+from jaxtyping import Array, Float
 
 from smajax.attribution.unknown.spline import COUNT, powers_of, spline
 from smajax.core.parameters import parameter
@@ -62,7 +63,7 @@ class AbstractUnknown(AbstractEffect):
     low: Scalar = eqx.field(converter=jnp.asarray, default=0.0)  # x_0, in the state's unit
     width: Scalar = eqx.field(converter=jnp.asarray, default=1.0)  # w
     scale: Scalar = eqx.field(converter=jnp.asarray, default=1.0)  # s, in the function's unit
-    powers: tuple[Scalar, ...] | None = None  # what `prepared` computes
+    powers: Float[Array, 11] | None = None  # what `prepared` computes
 
     symbol: ClassVar[str]  # of the state
     state: ClassVar[str]  # the state in words
@@ -74,8 +75,8 @@ class AbstractUnknown(AbstractEffect):
         """The same with the spline of its waves computed."""
         return dataclasses.replace(self, powers=self._powers())
 
-    def _powers(self) -> tuple[Scalar, ...]:
-        return tuple(self.scale * one for one in powers_of([getattr(self, name) for name in COEFFICIENTS]))
+    def _powers(self) -> Float[Array, 11]:
+        return self.scale * powers_of([getattr(self, name) for name in COEFFICIENTS])
 
     def value(self, x: Scalar) -> Scalar:
         """f(x)."""

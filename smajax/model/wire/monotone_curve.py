@@ -9,7 +9,6 @@ last ones a straight line.
 from __future__ import annotations
 
 import dataclasses
-import itertools
 from collections.abc import Sequence
 
 import equinox as eqx
@@ -25,6 +24,11 @@ _BEFORE = (0.12818843369794988, 0.2951672353008665, 0.43590578315102513)
 KNOTS = (0.0, *_BEFORE, *(1.0 - one for one in reversed(_BEFORE)), 1.0)
 _HELD = 2, 5  # knots that stay where they are
 _COSINE = np.diff(KNOTS)
+# Of the coefficients, each side's from the middle outwards: which add up to how much wider each part is than the middle one.
+_OUTWARDS = np.zeros((7, 6))
+_OUTWARDS[:3, :3], _OUTWARDS[4:, 3:] = np.tri(3)[::-1], np.tri(3)
+# Of the parts: which lie between a knot and the first that is held, to its left or its right.
+_FURTHER = np.tri(8, 7, -1) - np.tri(8, 7, -1)[_HELD[0]]
 _SHARES = _COSINE[_HELD[0] : _HELD[1]] / (KNOTS[_HELD[1]] - KNOTS[_HELD[0]])  # of the parts between those
 
 
@@ -110,19 +114,13 @@ def monotone_curve(before: Sequence[Scalar], after: Sequence[Scalar]) -> Monoton
     next to it towards the middle, over the same in the cosine, -.
     """
     # The map less z is interpolated, so that it is zero to the bit where nothing is stretched. Arrays of all parts are an eighth of the operations to trace.
-    outwards = [*reversed(list(itertools.accumulate(before))), jnp.zeros_like(before[0]), *itertools.accumulate(after)]
-    wider = jnp.expm1(jnp.stack(outwards))
+    wider = jnp.expm1(_OUTWARDS @ jnp.stack([*before, *after]))
     between = _SHARES @ wider[_HELD[0] : _HELD[1]]
     scale = 1.0 / (1.0 + between)
     stretch, excess = (1.0 + wider) * scale, (wider - between) * scale  # `excess` is `stretch` less 1
     width = _COSINE * stretch
-    parts = list(_COSINE * excess)
-    further = [jnp.zeros_like(between)]  # by how much each knot lies further right
-    for one in parts[_HELD[0] :]:
-        further.append(further[-1] + one)
-    for one in reversed(parts[: _HELD[0]]):
-        further.insert(0, further[0] - one)
-    knots = np.asarray(KNOTS) + jnp.stack(further)
+    further = _FURTHER @ (_COSINE * excess)  # by how much each knot lies further right
+    knots = np.asarray(KNOTS) + further
     left, right, one, other = width[:-1], width[1:], stretch[:-1], stretch[1:]
     first, second = 2.0 * right + left, right + 2.0 * left
     inner = -(first * excess[:-1] + second * excess[1:]) / (first * one + second * other)
