@@ -9,7 +9,15 @@ from typing import Any
 
 from markupsafe import Markup
 
-from smajax.attribution.findings import Findings, ParameterFinding, Role, coverage, moving_coverage, pooled_rmse
+from smajax.attribution.findings import (
+    Findings,
+    ParameterFinding,
+    Remaining,
+    Role,
+    coverage,
+    moving_coverage,
+    pooled_rmse,
+)
 from smajax.attribution.verdict import unknowns_at_bounds
 from smajax.core.display_units import chance, correlation, digits, display, label, p_value, with_error
 from smajax.core.names_of_runs import is_of_run, of_run, parameter_of
@@ -218,13 +226,15 @@ def _runs(findings: Findings) -> list[dict[str, Any]]:
     """Every run with its numbers, its plot and its picture over the temperature."""
     plots = series_of_runs([[run_plots.over_time(findings, run)] for run in findings.runs])
     many = len(plots) > MANY
+    # Not while the search begins: drawing them would hold it up for seconds, and the pages that follow have them.
+    drawn = findings.remaining is not Remaining.SEARCH
     return [
         {
             "run": run,
             "noise_ratio": run.rmse_after / findings.noise_sigma if findings.noise_sigma > 0.0 else float("nan"),
             "over_time": plot,
             "hysteresis": picture(
-                pictures.run_hysteresis(findings, run, _hysteresis_dpi(number, many)),
+                pictures.run_hysteresis(findings, run, _hysteresis_dpi(number, many)) if drawn else None,
                 f"Run {run.name} against the wire's temperature",
             ),
         }

@@ -330,14 +330,16 @@ def _begun(
         ordered=tuple,
         without=lambda values, _: np.array(values),
     )
-    search = SimpleNamespace(fitted=fitted, error=lambda _: 1.0, excluded=frozenset(), programs=(), joint=before)
+    search = SimpleNamespace(
+        fitted=fitted, error=lambda _: 1.0, excluded=frozenset(), programs=(), traced=(), joint=before
+    )
     begun: list[dict[tuple[str, ...], np.ndarray]] = []
     joint = SimpleNamespace(
         slots={"fitted": 0, "held": 1, "new": 2, "coefficient": 3, "of a second record": 4},
         coefficients={},
         free=lambda _: ["fitted", "new", "coefficient", "of a second record"],
     )
-    again = SimpleNamespace(programs=(), joint=joint, excluded=frozenset())
+    again = SimpleNamespace(programs=(), traced=(), joint=joint, excluded=frozenset())
     monkeypatch.setattr(joint_stage._Stage, "joint_search", lambda *_: again)
     monkeypatch.setattr(joint_stage, "search_jointly", lambda _, starts: begun.append(starts))
     monkeypatch.setattr(joint_stage, "_kept_at_half_step", lambda _, searched: searched())
