@@ -5,7 +5,7 @@ The translator reads a primitive's parameters by the names on the left, which ar
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -131,19 +131,32 @@ def kind_of(aval: Any) -> tuple[tuple[int, ...], str]:
 
 def expanded(equation: Any) -> Any | None:
     """The program that a primitive stands for: one of ours, or JAX's own (of its "hijax" primitives, since 0.11)."""
-    ours = EXPANSIONS.get(equation.primitive.name)
-    lower = vars(equation.primitive).get("to_lojax")
-    if ours is not None:
-        stands_for = ours(parameters_of(equation))
-    elif lower is not None:
-        stands_for = partial(lower, **equation.params)
+    primitive, params = equation.primitive, equation.params
+    if primitive.name in EXPANSIONS:
+        stands_for = EXPANSIONS[primitive.name](parameters_of(equation))
+    elif (lower := vars(primitive).get("to_lojax")) is not None:
+        stands_for = partial(lower, **params)
     else:
         return None
-    kinds = []
-    for one in equation.invars:
-        shape, dtype = kind_of(one.aval)
-        kinds.append(jax.ShapeDtypeStruct(shape, dtype, weak_type=getattr(one.aval, "weak_type", False)))
+    kinds = tuple((*kind_of(one.aval), bool(getattr(one.aval, "weak_type", False))) for one in equation.invars)
     try:
-        return jax.make_jaxpr(stands_for)(*kinds)
+        key = (primitive, tuple(sorted(params.items())), kinds)
+        if key not in _traced:
+            _traced[key] = _traced_for(stands_for, primitive.name, kinds)
+        return _traced[key]
+    except TypeError:  # parameters that cannot be looked up by
+        return _traced_for(stands_for, primitive.name, kinds)
+
+
+_traced: dict[
+    Hashable, Any
+] = {}  # programs, by primitive, parameters and kinds: few, and each asked for in every program
+
+
+def _traced_for(stands_for: Callable[..., Any], name: str, kinds: Sequence[tuple[tuple[int, ...], str, bool]]) -> Any:
+    try:
+        return jax.make_jaxpr(stands_for)(
+            *(jax.ShapeDtypeStruct(shape, dtype, weak_type=weak) for shape, dtype, weak in kinds)
+        )
     except Exception as error:  # of JAX's own: it has a lowering there that is not meant for this primitive
-        raise Unsupported(f"the operation `{equation.primitive.name}`") from error
+        raise Unsupported(f"the operation `{name}`") from error

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 NAMES = re.compile(r"%[a-z]+\d+")
@@ -15,7 +16,8 @@ class Work:
 
     name: str | None  # of what comes out
     lines: list[str]
-    reads: tuple[str, ...]  # names of what goes in and differs from vector to vector
+    names: Sequence[str]  # of what goes in
+    reads: tuple[str, ...]  # those of them that differ from vector to vector
 
 
 @dataclass(slots=True)

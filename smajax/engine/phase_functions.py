@@ -7,7 +7,7 @@ programs, if all phases were loops of one function.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from smajax.engine.parts import LINE, NAMES, Names, Phase, Uniform, Work
 
@@ -22,7 +22,7 @@ def phase_function(
     `alone`: of a group of a single vector, where LLVM may put it in the place of its call.
     """
     body = _body(phase, number, names, lanes, places)
-    addresses, arguments = _from_outside(body, uniform)
+    addresses, arguments = _from_outside(phase, uniform)
     given = ["ptr {}%scratch", *(f"{uniform.kinds[one]} {{}}{one}" for one in arguments)]
     given += [] if phase.chosen else ["i64 {}%vectors"]
     called = ", ".join(one.format("") for one in given)
@@ -33,8 +33,8 @@ def phase_function(
     return f"  call void @phase{number}({called})", [*lines, *body, "}"]
 
 
-def _from_outside(body: Sequence[str], uniform: Uniform) -> tuple[list[str], list[str]]:
-    """(addresses to compute again, values to be handed over) of what is used and not made in a function.
+def _from_outside(phase: Phase, uniform: Uniform) -> tuple[list[str], list[str]]:
+    """(addresses to compute again, values to be handed over) of what a phase uses and does not make.
 
     An address says more where LLVM sees what it was computed from: which of two may be the same place.
     """
@@ -51,9 +51,13 @@ def _from_outside(body: Sequence[str], uniform: Uniform) -> tuple[list[str], lis
             ask(one)
         addresses[name] = None
 
-    for line in body:
-        for name in NAMES.findall(line):
+    for name in (phase.chosen.count, phase.chosen.numbers) if phase.chosen else ():
+        ask(name)
+    for work in phase.works:
+        for name in work.names if isinstance(work, Work) else ():
             ask(name)
+    for _, value in phase.stores:
+        ask(value)
     return list(addresses), list(arguments)
 
 
@@ -90,7 +94,10 @@ def _body(phase: Phase, number: int, names: Names, lanes: int, places: Mapping[s
             lines.append(f"  {here[name]}.stored = load {layout.kind}, {where}")
             lines.append(f"  {here[name]} = icmp slt {layout.kind} {here[name]}.stored, zeroinitializer")
     for work in phase.works:
-        lines += ["  " + own(one) for one in work.lines] if isinstance(work, Work) else []
+        if not isinstance(work, Work):
+            continue
+        loaded = any(name in here for name in work.names)
+        lines += ["  " + (own(one) if loaded else one) for one in work.lines]
     for k, (name, value) in enumerate(phase.stores):
         layout, where, what = names.layouts[name], address(name, f"store.{k}"), own(value)
         if layout.mask is not None:

@@ -132,7 +132,7 @@ class Text:
         if reads := self._reads(names):
             assert dtype is not None, f"of an unknown kind: {right}"
             self.names.layouts[name] = self.layout(dtype)
-            level.items.append(Work(name, [f"{name} = {right}"], reads))
+            level.items.append(Work(name, [f"{name} = {right}"], names, reads))
         else:
             level.items.append(f"  {name} = {right}")
             self._note_uniform(name, right, dtype)
@@ -177,7 +177,7 @@ class Text:
             own[-1] = f"{name} = {own[-1]}"
         inside = {one.split(" = ")[0].strip() for one in own}
         names = [one for line in own for one in NAMES.findall(line) if one not in inside]
-        self.levels[-1].items.append(Work(name, own, self._reads(names)))
+        self.levels[-1].items.append(Work(name, own, names, self._reads(names)))
         return name or ""
 
     def lane(self, right: str, dtype: str) -> Lane:
