@@ -18,6 +18,11 @@ def _weight(problem: Problem, task: FitTask) -> np.ndarray:
     return np.repeat(np.sqrt(task.weights), len(problem.batch.outputs))[:, None] / np.asarray(problem.noise)
 
 
+def _with_weight(tasks: Sequence[FitTask]) -> np.ndarray:
+    """Which runs each task does not leave out, (tasks, R)."""
+    return np.stack([task.weights > 0.0 for task in tasks])
+
+
 def _residual(
     problem: Problem, task: FitTask, y: np.ndarray, point: np.ndarray, predicted: np.ndarray, measured: np.ndarray
 ) -> np.ndarray:
@@ -48,7 +53,7 @@ def costs(
     points = np.stack([task.values_at(y) for task, y in zip(tasks, ys, strict=True)])
     measured = [problem.measured] * len(tasks) if outputs is None else outputs
     found = []
-    for one in zip(tasks, ys, points, predicted_at(problem, points), measured, strict=True):
+    for one in zip(tasks, ys, points, predicted_at(problem, points, asked=_with_weight(tasks)), measured, strict=True):
         value = _residual(problem, *one)
         with np.errstate(over="ignore", invalid="ignore"):
             found.append(float(value @ value))
@@ -64,7 +69,7 @@ def normal_equations(
     tangents = np.zeros((len(tasks), most, points.shape[1]))
     for rows, task in zip(tangents, tasks, strict=True):
         rows[np.arange(len(task.slots)), task.slots] = task.high - task.low
-    predicted, derivatives = predicted_and_derivatives(problem, points, tangents)
+    predicted, derivatives = predicted_and_derivatives(problem, points, tangents, _with_weight(tasks))
     measured = [problem.measured] * len(tasks) if outputs is None else outputs
     equations = []
     for k, (task, y) in enumerate(zip(tasks, ys, strict=True)):
