@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -11,6 +12,9 @@ from typing import TypeVar
 from smajax.cli.terminal import interrupts_answered
 
 Known = TypeVar("Known")
+# Seconds after which Python lets another thread go on, a tenth of its own: the search runs machine code for milliseconds at a time, and would wait
+# for as long after each.
+SWITCHING = 5e-4
 
 
 @contextmanager
@@ -36,8 +40,11 @@ def written_beside(write: Callable[[Known], object]) -> Iterator[Callable[[Known
             took = timed(known)
         return took
 
+    switching = sys.getswitchinterval()
+    sys.setswitchinterval(SWITCHING)
     try:
         yield begin
     finally:
+        sys.setswitchinterval(switching)
         with interrupts_answered():
             pool.shutdown()
