@@ -46,8 +46,8 @@ def scanned(
     `effects`, which are off, are each at the place whose trace promises most beside what the fitted parameters absorb. `looked_for`, `compiled`: as of
     `traces_at`.
     """
-    programs = by_program(effects, looked_for)
     samples = setting.problem.measured.shape[-1]
+    programs = by_program(effects, looked_for, samples)
     restricted = [setting.restricted(carrying((*present, *together), compiled, samples)) for together in programs]
     own, index = setting.restricted(present)
     misfit = misfits(own, [values[index]])[0] / np.asarray(own.noise)

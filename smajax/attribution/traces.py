@@ -17,8 +17,9 @@ from smajax.attribution.fit_programs import Effects, carrying
 from smajax.attribution.joint_parameters import NUDGE, JointParameters, residual_and_columns
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.fit.integration import with_integration
-from smajax.fit.outputs_of_runs import made_ready, slopes_at
+from smajax.fit.outputs_of_runs import SHORT, made_ready, slopes_at
 from smajax.fit.problem import Problem
+from smajax.model.drive.inputs import InputLagTerm
 from smajax.model.effects.candidate import Extent
 from smajax.model.effects.library import LIBRARY
 from smajax.simulation.steppers import ONE_STEP
@@ -62,8 +63,8 @@ def traces_at(
     values, present = model.values, model.effects
     among = joint.coefficients if candidates is None else joint.ordered((*present, *candidates))
     absent = [effect for effect in among if effect not in present]
-    programs = by_program(absent, looked_for)
     samples = joint.problem.measured.shape[-1]
+    programs = by_program(absent, looked_for, samples)
     carried = [carrying(joint.ordered((*present, *together)), compiled, samples) for together in programs]
     restricted = [joint.restricted(one) for one in carried]
     shared = joint.free([effect for effect in among if effect in present])
@@ -127,18 +128,19 @@ def _traced(
     return residual, columns, variants, places
 
 
-def by_program(effects: Sequence[str], looked_for: Sequence[str] | None = None) -> list[list[str]]:
+def by_program(effects: Sequence[str], looked_for: Sequence[str] | None = None, samples: int = 0) -> list[list[str]]:
     """Effects in the programs that compute their traces; one, of none, where there are none.
 
     Effects of a group that exclude each other are apart from the others: each of these would be computed with all of those in every step. On a
-    bias-spring bench 48 effects take 0.8 s in two programs and 1.9 s in one, and half the time to compile. Those that the search does not look for
-    have a program of their own too, so that the others share the search's; `looked_for`: None for all.
+    bias-spring bench 48 effects take 0.8 s in two programs and 1.9 s in one, and half the time to compile. So are, where a run has many `samples`, those
+    that shift an input: beside them every step has three parts, and the others take a third of the time without. Those that the search does not look for have a program of their own too, so that the others share the search's; `looked_for`: None for all.
     """
     among = effects if looked_for is None else [effect for effect in effects if effect in looked_for]
     apart = list(of_groups(among))
-    others = [effect for effect in among if effect not in apart]
+    late = [effect for effect in among if samples > SHORT and issubclass(LIBRARY[effect], InputLagTerm)]
+    others = [effect for effect in among if effect not in apart and effect not in late]
     rest = [effect for effect in effects if effect not in among]
-    return [one for one in (others, apart, rest) if one] or [[]]
+    return [one for one in (others, apart, late, rest) if one] or [[]]
 
 
 def _places(joint: JointParameters, effects: Sequence[str], extent: Extent) -> dict[Variant, Mapping[str, float]]:

@@ -85,7 +85,7 @@ def test_traces_are_the_same_in_one_program_and_in_several(
 ) -> None:
     _, _, several = _linear(search, ("latent_heat",))
     assert len(traces.by_program((*SHAPES, "sensor_gain"))) == 2
-    monkeypatch.setattr(traces, "by_program", lambda effects, looked_for=None: [list(effects)])
+    monkeypatch.setattr(traces, "by_program", lambda effects, *_: [list(effects)])
     _, _, one = _linear(search, ("latent_heat",))
     assert several.columns.keys() == one.columns.keys()
     for name, column in one.columns.items():
@@ -102,6 +102,13 @@ def test_programs_of_what_is_not_looked_for_leave_those_of_the_search_alone() ->
         ["radiation", "asymmetric_transformation"],
     ]
     assert traces.by_program(()) == [[]]
+
+
+def test_what_shifts_an_input_has_a_program_of_its_own_where_runs_are_long() -> None:
+    effects = ("input_delay", "input_clock", "latent_heat", "smooth_transformation")
+    assert traces.by_program(effects) == [list(effects[:3]), ["smooth_transformation"]]
+    several = [["latent_heat"], ["smooth_transformation"], ["input_delay", "input_clock"]]
+    assert traces.by_program(effects, None, 10_000) == several
 
 
 def test_none_of_a_group_that_the_base_model_has_one_of_is_a_candidate() -> None:
