@@ -224,9 +224,10 @@ def _figures(findings: Findings, output: Callable[[float | None], Shown]) -> lis
 
 def _runs(findings: Findings) -> list[dict[str, Any]]:
     """Every run with its numbers, its plot and its picture over the temperature."""
-    plots = series_of_runs([[run_plots.over_time(findings, run)] for run in findings.runs])
+    finished = not findings.remaining
+    plots = series_of_runs([[run_plots.over_time(findings, run)] for run in findings.runs], drawn=finished)
     many = len(plots) > MANY
-    # Not while the search begins: drawing them would hold it up for seconds, and the pages that follow have them.
+    # Drawing takes seconds, in which the search would stand still: what unfinished pages show without it is enough for them.
     drawn = findings.remaining is not Remaining.SEARCH
     return [
         {
@@ -326,7 +327,7 @@ def findings_to_html(findings: Findings, narrative: Narrative | None = None, ste
     def output(value: float | None) -> Shown:
         return shown(value, findings.output_unit, findings.output_name, 3, zeros=True)
 
-    unnamed = zero_so_far(findings)
+    unnamed, finished = zero_so_far(findings), not findings.remaining
     first, correlation_of = run_plots.first_plot(findings), run_plots.residual_correlation(findings)
     return (
         environment()
@@ -375,7 +376,7 @@ def findings_to_html(findings: Findings, narrative: Narrative | None = None, ste
             unknown=_unknown(findings),
             units=units,
             figures=_figures(findings, output),
-            picture_first="" if first is None else series(first, FIRST_POINTS),
+            picture_first="" if first is None else series(first, FIRST_POINTS, drawn=finished),
             picture_errors=picture(pictures.errors_by_run(findings), "Error of each run before and after", "narrow"),
             picture_candidates=picture(
                 pictures.effect_probabilities(findings), "Candidates by posterior probability", "narrow"
@@ -385,6 +386,6 @@ def findings_to_html(findings: Findings, narrative: Narrative | None = None, ste
                 "Residual by phase of the wire",
                 upright=pictures.residual_by_phase(findings, upright=True),
             ),
-            picture_correlation="" if correlation_of is None else series(correlation_of),
+            picture_correlation="" if correlation_of is None else series(correlation_of, drawn=finished),
         )
     )

@@ -111,14 +111,14 @@ def series(plot: SeriesPlot, most: int = POINTS, dpi: int = DPI, drawn: bool = T
     return moving(plot, picture(as_picture(plot, dpi), plot.about), most)
 
 
-def series_of_runs(plots: Sequence[Sequence[SeriesPlot]], most: int | None = None) -> list[Markup]:
+def series_of_runs(plots: Sequence[Sequence[SeriesPlot]], most: int | None = None, drawn: bool = True) -> list[Markup]:
     """The plots of each run for a page: those that are folded away (`plain_page.folded`) without pictures, coarse ones where there are many.
 
-    most: samples of each series; by default what a page has room for that holds no others.
+    most: samples of each series; by default what a page has room for that holds no others. drawn: whether any has a picture.
     """
     every = [plot for several in plots for plot in several]
     samples, dpi = samples_of(every) if most is None else most, COARSE if len(every) > MANY else DPI
     return [
-        Markup("").join(series(plot, samples, dpi, number < MANY) for plot in several)
+        Markup("").join(series(plot, samples, dpi, drawn and number < MANY) for plot in several)
         for number, several in enumerate(plots)
     ]
