@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import atexit
+import gc
 import sys
 import warnings
 from collections.abc import Callable
@@ -108,6 +110,8 @@ def _warned(message: Warning | str, *_: object, **__: object) -> None:
 def main() -> None:
     """Entry point. Errors that a user can correct are one paragraph with exit code 2, without a traceback."""
     warnings.showwarning = _warned
+    # When the process ends Python looks for garbage among the millions of objects of traced programs: a second after the last word.
+    atexit.register(gc.freeze)
     words, messages = with_new_names(sys.argv[1:])
     for message in messages:
         sys.stderr.write(f"deprecated: {message}\n")
