@@ -26,6 +26,7 @@ from smajax.attribution.record_error import FoundRecordErrors, RecordError
 from smajax.attribution.record_fits import (
     LEAST_ODDS,
     MOST_LEFT,
+    OF_RECORDS,
     Beside,
     Fit,
     Host,
@@ -38,6 +39,7 @@ from smajax.core.names_of_runs import of_run
 from smajax.core.parameters import parameters
 from smajax.data.experiment.record import Experiment, Prior, Run, Unknown
 from smajax.fit.base_model import base_model
+from smajax.fit.outputs_of_runs import SHORT
 from smajax.model.extended import with_effects
 from smajax.model.system import System, recorded_apart
 
@@ -67,7 +69,10 @@ def record_errors(
     if len(runs) < LEAST_RUNS:
         return None
     names = [run.name for run in runs]
-    sought = [one for host in hosts if (one := Beside.of(setting, host, names)) is not None]
+    # Of short runs one program for all hosts takes less time than to compile one for each.
+    short = setting.problem.measured.shape[-1] <= SHORT
+    carried = [effect for host in hosts for effect in host.effects if effect not in OF_RECORDS] if short else ()
+    sought = [one for host in hosts if (one := Beside.of(setting, host, names, carried)) is not None]
     singly = [one.singly() for one in sought]
     fits = [fit for its_fits in singly for fit in its_fits]
     if not fits:

@@ -69,6 +69,9 @@ KINDS = (
 )
 
 
+OF_RECORDS = {kind.coefficient.split(".")[0] for kind in KINDS}  # effects that say how a record is wrong
+
+
 def kind_of(coefficient: str) -> Kind:
     """The way in which a record is wrong that has this coefficient."""
     return next(kind for kind in KINDS if kind.coefficient == coefficient)
@@ -143,9 +146,9 @@ class Beside:
     left: np.ndarray  # (series, N), misfit of the host, SI
 
     @classmethod
-    def of(cls, setting: Search, host: Host, runs: Sequence[str]) -> Beside | None:
-        """None where no record can be wrong in any of the ways known."""
-        own, slots = setting.restricted(host.effects)
+    def of(cls, setting: Search, host: Host, runs: Sequence[str], carried: Sequence[str] = ()) -> Beside | None:
+        """None where no record can be wrong in any of the ways known. `carried`: effects that its program has as well, off."""
+        own, slots = setting.restricted((*host.effects, *carried))
         values = jnp.asarray(host.values[slots])
         system, known = own.system_at(values), own.per_run.names
         kinds = [kind for kind in KINDS if kind.coefficient in own.per_run.single or _possible(kind, system)]
