@@ -22,7 +22,7 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 
 from smajax.attribution.exclusive_effects import of_groups
-from smajax.fit.outputs_of_runs import SHORT
+from smajax.fit.problem import Problem
 from smajax.model.effects.library import LIBRARY
 
 Effects = tuple[str, ...]
@@ -83,15 +83,11 @@ def _kind(effect: str) -> tuple[float, float]:
 
 
 def compiled_for(effects: Effects, compiled: Sequence[Effects], samples: int) -> Effects:
-    """The program in which one set of effects is fitted: of those `compiled`, or its own where that soon takes less time. `samples` of all runs."""
+    """The program in which one set of effects is fitted, or its linear model taken: of those `compiled`, or its own where that takes less time. `samples` of all runs."""
     ((program, _),) = grouped([effects], compiled, samples)
     return next((one for one in compiled if frozenset(one) == program), effects)
 
 
-def carrying(effects: Effects, compiled: Sequence[Effects], samples: int) -> Effects:
-    """The program for a few runs of a model with `effects`: the smallest of those `compiled` that carries them, or one of their own.
-
-    Effects that are off change nothing but the time of a run, which is soon more than that of compiling where a run has many `samples`.
-    """
-    known = [one for one in compiled if set(effects) <= set(one)] if samples <= SHORT else []
-    return min(known, key=len, default=effects)
+def samples_of(problem: Problem) -> int:
+    """Of all runs."""
+    return problem.batch.runs * problem.measured.shape[-1]

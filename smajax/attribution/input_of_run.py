@@ -19,6 +19,7 @@ from functools import cached_property
 
 from smajax.attribution.explained_share import EXPLAINED, explained_share
 from smajax.attribution.findings import ParameterFinding
+from smajax.attribution.fit_programs import grouped, samples_of
 from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model, independent_error
 from smajax.attribution.model_fits import Model, Search
@@ -39,7 +40,6 @@ from smajax.core.names_of_runs import of_run
 from smajax.core.parameters import parameters
 from smajax.data.experiment.record import Experiment, Prior, Run, Unknown
 from smajax.fit.base_model import base_model
-from smajax.fit.outputs_of_runs import SHORT
 from smajax.model.extended import with_effects
 from smajax.model.system import System, recorded_apart
 
@@ -48,6 +48,7 @@ ON_TRIAL = (
     4.0  # times less than the base model that values of one run, or of two, leave of all runs, to be corrected on trial
 )
 AT_NOISE = 1.1  # noises: what leaves no more leaves noise
+FITS = 12  # beside each host, as a rule: of two runs, each in every way in which its record may be wrong
 LEAST_RUNS = 3  # of two runs that disagree either may be the wrong one
 
 
@@ -69,10 +70,8 @@ def record_errors(
     if len(runs) < LEAST_RUNS:
         return None
     names = [run.name for run in runs]
-    # Of short runs one program for all hosts takes less time than to compile one for each.
-    short = setting.problem.measured.shape[-1] <= SHORT
-    carried = [effect for host in hosts for effect in host.effects if effect not in OF_RECORDS] if short else ()
-    sought = [one for host in hosts if (one := Beside.of(setting, host, names, carried)) is not None]
+    carried = _carried(setting, hosts)
+    sought = [one for host, more in zip(hosts, carried, strict=True) if (one := Beside.of(setting, host, names, more))]
     singly = [one.singly() for one in sought]
     fits = [fit for its_fits in singly for fit in its_fits]
     if not fits:
@@ -95,6 +94,14 @@ def record_errors(
     compared = replace(compared, fits=(*fits, *both))
     both = [fit for fit in both if needed(fit, compared.error, len(runs))]
     return found(compared.explaining(both)) or found(compared.on_trial(both))
+
+
+def _carried(setting: Search, hosts: Sequence[Host]) -> list[list[str]]:
+    """Effects that the program of each host has beside its own: those of hosts with which sharing one takes less time."""
+    sets = [tuple(host.effects) for host in hosts]
+    groups = grouped(sets, (), FITS * samples_of(setting.problem))
+    program_of = {effects: program for program, its_sets in groups for effects in its_sets}
+    return [sorted(program_of[effects] - set(effects) - OF_RECORDS) for effects in sets]
 
 
 @dataclass(frozen=True)

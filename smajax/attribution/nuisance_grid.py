@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from smajax.attribution.fit_programs import Effects, carrying
+from smajax.attribution.fit_programs import Effects, compiled_for, samples_of
 from smajax.attribution.model_fits import Model, Search, nudged
 from smajax.attribution.score_test import Score, ranked, samples_per_independent, score_of, switches, without
 from smajax.attribution.traces import by_program, far_from, from_coarse_to_fine
@@ -46,9 +46,9 @@ def scanned(
     `effects`, which are off, are each at the place whose trace promises most beside what the fitted parameters absorb. `looked_for`, `compiled`: as of
     `traces_at`.
     """
-    samples = setting.problem.measured.shape[-1]
+    samples = samples_of(setting.problem)
     programs = by_program(effects, looked_for, samples)
-    restricted = [setting.restricted(carrying((*present, *together), compiled, samples)) for together in programs]
+    restricted = [setting.restricted(compiled_for((*present, *together), compiled, samples)) for together in programs]
     own, index = setting.restricted(present)
     misfit = misfits(own, [values[index]])[0] / np.asarray(own.noise)
     slots = [slots for _, slots in restricted]

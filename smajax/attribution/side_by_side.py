@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from smajax.attribution.fit_programs import Effects, compiled_for, grouped
+from smajax.attribution.fit_programs import Effects, compiled_for, grouped, samples_of
 from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.program_fits import MOST_WIDENED, BegunFit, comparison_settings, models_by_program
@@ -49,7 +49,7 @@ def grouped_sets(
 ) -> list[tuple[tuple[str, ...], list[tuple[str, ...]]]]:
     """(effects that a program carries, sets that are fitted in it), and remember the programs."""
     found = []
-    for union, its_sets in grouped(sets, search.programs, _samples(search)):
+    for union, its_sets in grouped(sets, search.programs, samples_of(search.joint.problem)):
         program = search.joint.ordered(tuple(union))
         search.programs = tuple(dict.fromkeys([*search.programs, program]))
         found.append((program, its_sets))
@@ -66,13 +66,7 @@ def smallest_program(search: JointSearch, effects: Sequence[str]) -> tuple[str, 
 def program_compiled(search: JointSearch, effects: Effects, beside: Effects) -> Effects:
     """For a fit of a set of effects: that of the programs compiled, that of `beside` among them, in which it takes less time than to compile one of its own; else that."""
     programs = [search.joint.ordered(one) for one in (*search.programs, beside)]
-    return compiled_for(effects, programs, _samples(search))
-
-
-def _samples(search: JointSearch) -> int:
-    """Of all runs, which a fit takes each time."""
-    batch = search.joint.problem.batch
-    return batch.runs * batch.output.shape[-1]
+    return compiled_for(effects, programs, samples_of(search.joint.problem))
 
 
 def fitted_from(search: JointSearch, model: FittedModel) -> FittedModel:

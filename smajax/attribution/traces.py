@@ -13,17 +13,18 @@ from typing import NamedTuple
 import numpy as np
 
 from smajax.attribution.exclusive_effects import of_groups
-from smajax.attribution.fit_programs import Effects, carrying
+from smajax.attribution.fit_programs import Effects, compiled_for, samples_of
 from smajax.attribution.joint_parameters import NUDGE, JointParameters, residual_and_columns
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.fit.integration import with_integration
-from smajax.fit.outputs_of_runs import SHORT, made_ready, slopes_at
+from smajax.fit.outputs_of_runs import made_ready, slopes_at
 from smajax.fit.problem import Problem
 from smajax.model.drive.inputs import InputLagTerm
 from smajax.model.effects.candidate import Extent
 from smajax.model.effects.library import LIBRARY
 from smajax.simulation.steppers import ONE_STEP
 
+MANY = 5_000  # samples of all runs, from which on a linear model takes longer than compiling a program for it
 MOST_OFF = 1.0  # of what a model leaves, root mean square: what one step a sample may be off by where derivatives are taken by it
 
 
@@ -63,9 +64,9 @@ def traces_at(
     values, present = model.values, model.effects
     among = joint.coefficients if candidates is None else joint.ordered((*present, *candidates))
     absent = [effect for effect in among if effect not in present]
-    samples = joint.problem.measured.shape[-1]
+    samples = samples_of(joint.problem)
     programs = by_program(absent, looked_for, samples)
-    carried = [carrying(joint.ordered((*present, *together)), compiled, samples) for together in programs]
+    carried = [compiled_for(joint.ordered((*present, *together)), compiled, samples) for together in programs]
     restricted = [joint.restricted(one) for one in carried]
     shared = joint.free([effect for effect in among if effect in present])
     for problems in from_coarse_to_fine([problem for problem, _ in restricted]):
@@ -132,12 +133,12 @@ def by_program(effects: Sequence[str], looked_for: Sequence[str] | None = None, 
     """Effects in the programs that compute their traces; one, of none, where there are none.
 
     Effects of a group that exclude each other are apart from the others: each of these would be computed with all of those in every step. On a
-    bias-spring bench 48 effects take 0.8 s in two programs and 1.9 s in one, and half the time to compile. So are, where a run has many `samples`, those
+    bias-spring bench 48 effects take 0.8 s in two programs and 1.9 s in one, and half the time to compile. So are, where the runs have many `samples`, those
     that shift an input: beside them every step has three parts, and the others take a third of the time without. Those that the search does not look for have a program of their own too, so that the others share the search's; `looked_for`: None for all.
     """
     among = effects if looked_for is None else [effect for effect in effects if effect in looked_for]
     apart = list(of_groups(among))
-    late = [effect for effect in among if samples > SHORT and issubclass(LIBRARY[effect], InputLagTerm)]
+    late = [effect for effect in among if samples > MANY and issubclass(LIBRARY[effect], InputLagTerm)]
     others = [effect for effect in among if effect not in apart and effect not in late]
     rest = [effect for effect in effects if effect not in among]
     return [one for one in (others, apart, late, rest) if one] or [[]]

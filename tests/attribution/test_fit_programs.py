@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from smajax.attribution.fit_programs import carrying, compiled_for, grouped
+from smajax.attribution.fit_programs import compiled_for, grouped
 
 FEW, MANY = 2_000, 100_000  # samples
 
@@ -16,7 +16,6 @@ def test_a_program_that_was_compiled_before_is_used_again() -> None:
     compiled = [("latent_heat", "radiation", "creep"), ("radiation", "creep")]
     assert grouped([("creep",)], compiled, FEW) == [(frozenset({"radiation", "creep"}), [("creep",)])]
     assert compiled_for(("creep",), compiled, FEW) == ("radiation", "creep")
-    assert carrying(("creep",), compiled, FEW // 4) == ("radiation", "creep")
 
 
 def test_the_more_samples_there_are_the_fewer_effects_a_program_carries_that_a_set_does_not_have() -> None:
@@ -28,7 +27,7 @@ def test_the_more_samples_there_are_the_fewer_effects_a_program_carries_that_a_s
     assert all(frozenset(one) <= program for program, its_sets in groups for one in its_sets)
     assert 1 < len(groups) <= len(sets)
     compiled = [("latent_heat", "radiation", "creep", "transformation_curve")]
-    assert compiled_for(("creep",), compiled, MANY) == carrying(("creep",), compiled, MANY) == ("creep",)
+    assert compiled_for(("creep",), compiled, MANY) == ("creep",)
 
 
 def test_what_makes_runs_much_slower_is_not_carried_for_many_sets_without_it() -> None:

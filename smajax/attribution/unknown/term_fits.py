@@ -23,7 +23,7 @@ from smajax.core.progress import Stage
 from smajax.data.experiment.record import Prior
 from smajax.fit.integration import limited_near, with_integration
 from smajax.fit.levenberg_marquardt import FitSettings
-from smajax.fit.outputs_of_runs import SHORT, made_ready
+from smajax.fit.outputs_of_runs import made_ready
 from smajax.fit.sensitivity import sensitivity
 from smajax.fit.starts import nearest
 from smajax.model.effects.candidate import PRIOR_ODDS
@@ -131,10 +131,9 @@ class TermFits:
 def fits_with_terms(setting: Search, final: Model | FittedModel, likely: Sequence[str] = ()) -> TermFits | None:
     """The terms that promise most, each fitted beside `final`; those that are `REACH` behind the likeliest are left out.
 
-    None where none promises anything. `likely`: effects beside which terms are likely to be asked for as well. Of short runs the program that screens them carries these: it is then there.
+    None where none promises anything. `likely`: effects beside which terms are likely to be asked for as well: the program that screens them carries a few of these, and is there then.
     """
-    short = setting.problem.measured.shape[-1] <= SHORT and len(likely) <= FEW_LIKELY
-    carried = tuple(likely) if short else ()
+    carried = tuple(likely) if len(likely) <= FEW_LIKELY else ()
     search, values, found = with_terms(setting, final, carried)
     if not search.candidates:
         return None
