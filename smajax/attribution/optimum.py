@@ -17,6 +17,7 @@ from smajax.attribution.reasons import NoiseWithoutEffects
 from smajax.attribution.side_by_side import program_compiled
 from smajax.core.whiteness import on_samples
 from smajax.fit.levenberg_marquardt import levenberg_marquardt
+from smajax.fit.priors import Priors
 
 AS_LIKELY = 0.5  # log odds: of two models that are nearer the search's stays
 SETTLED_COST = 1e-4  # of twice the log-likelihood: the optimum to within a hundredth of a standard error
@@ -29,8 +30,7 @@ def with_no_effect_too_many(search: JointSearch, found: FittedModel) -> FittedMo
         left.add(found.effects)
         error = search.error(found)
         found = refined(search, found, error)
-        for effect in found.effects:
-            without(search, found, effect, error)
+        without_each(search, found, found.effects, error)
         best = search.best(error)
         if best.log_evidence(error**2) - found.log_evidence(error**2) > AS_LIKELY:
             found = noted(search, found, best)
@@ -67,9 +67,9 @@ def leaves_noise(setting: Search, model: FittedModel) -> bool:
     return setting.all_noise(on_samples(model.residual, mask), mask)
 
 
-def refined(search: JointSearch, model: FittedModel, error: float, program: Sequence[str] | None = None) -> FittedModel:
+def refined(search: JointSearch, model: FittedModel, error: float) -> FittedModel:
     """`at_optimum`, among the models that the search has fitted."""
-    best = at_optimum(search, model, error, program)
+    best = at_optimum(search, model, error)
     if best is not model:
         search.fitted[model.effects] = best
     return best
@@ -82,20 +82,33 @@ def at_optimum(
 
     `program`: effects of a program that computes it, these among them; None for one of its own.
     """
-    carried = model.effects if program is None else program
-    joint = dataclasses.replace(search.joint, width_factors=model.width_factors)
-    problem, index = joint.restricted(carried)
+    (best,) = _at_optimum(search, [model], error, model.effects if program is None else program)
+    return best
+
+
+def _at_optimum(
+    search: JointSearch, models: Sequence[FittedModel], error: float, program: Sequence[str]
+) -> list[FittedModel]:
+    """The same of several models that one program computes, side by side."""
+    problem, index = search.joint.restricted(program)
     problem = problem.with_noise(error)
-    task = problem.task(model.names, joint.bounds, model.values[index])
+    tasks, joints = [], []
+    for model in models:
+        joint = dataclasses.replace(search.joint, width_factors=model.width_factors)
+        task = problem.task(model.names, joint.bounds, model.values[index])
+        tasks.append(task._replace(priors=Priors.of(problem.names, joint.prior_records(model.effects))))
+        joints.append(joint)
     # At a kink, as of a friction, a fit may come nearer to it by ever smaller steps, none of which any evidence or standard error shows.
     settings = dataclasses.replace(
         search.settings, stage="taking the model to its optimum", absolute_tolerance=SETTLED_COST
     )
-    (fit,) = levenberg_marquardt(problem, [task], settings)
-    values = np.array(model.values)
-    values[index] = fit.values
-    best = fitted_model(joint, model.effects, values, carried)
-    return best if best.log_evidence(error**2) > model.log_evidence(error**2) else model
+    found = []
+    for model, joint, fit in zip(models, joints, levenberg_marquardt(problem, tasks, settings), strict=True):
+        values = np.array(model.values)
+        values[index] = fit.values
+        best = fitted_model(joint, model.effects, values, tuple(program))
+        found.append(best if best.log_evidence(error**2) > model.log_evidence(error**2) else model)
+    return found
 
 
 def final_model(search: JointSearch, setting: Search, found: FittedModel, error: float) -> Model:
@@ -119,13 +132,26 @@ def final_model(search: JointSearch, setting: Search, found: FittedModel, error:
 
 def without(search: JointSearch, model: Model | FittedModel, effect: str, error: float) -> FittedModel:
     """`model` without one of its effects, at the optimum."""
-    rest = search.joint.ordered([one for one in model.effects if one != effect])
-    fitted = search.fitted.get(rest)
-    if fitted is None:
-        fitted = fitted_model(search.joint, rest, search.joint.without(model.values, rest), model.effects)
-        search.fitted[rest] = fitted
-    # In the search it may have ended early. The model itself has a program of its own, for what is said of it later.
-    return refined(search, fitted, error, program_compiled(search, rest, model.effects))
+    return without_each(search, model, (effect,), error)[effect]
+
+
+def without_each(
+    search: JointSearch, model: Model | FittedModel, effects: Sequence[str], error: float
+) -> dict[str, FittedModel]:
+    """`model` without each of `effects` in turn, at the optimum, by the effect; those that one program computes side by side."""
+    joint = search.joint
+    rests = {effect: joint.ordered([one for one in model.effects if one != effect]) for effect in effects}
+    by_program: dict[tuple[str, ...], list[FittedModel]] = {}
+    for rest in rests.values():
+        if rest not in search.fitted:
+            search.fitted[rest] = fitted_model(joint, rest, joint.without(model.values, rest), model.effects)
+        # The model itself has a program of its own, for what is said of it later.
+        program = program_compiled(search, rest, joint.ordered(model.effects))
+        by_program.setdefault(program, []).append(search.fitted[rest])
+    for program, models in by_program.items():
+        # In the search they may have ended early.
+        search.fitted |= {best.effects: best for best in _at_optimum(search, models, error, program)}
+    return {effect: search.fitted[rest] for effect, rest in rests.items()}
 
 
 def as_model(search: JointSearch, fitted: FittedModel, error: float) -> Model:
