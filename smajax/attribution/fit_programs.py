@@ -49,7 +49,7 @@ def grouped(
     groups = [_Group(frozenset(one), [], True) for one in compiled]
     for effects in dict.fromkeys(sets):
         alone = _Group(frozenset(effects), [], False)
-        best = min([*groups, alone], key=lambda group: _more(group, effects, samples))
+        best = min([*groups, alone], key=lambda group: (_more(group, effects, samples), len(group.program)))
         if best is alone:
             groups.append(best)
         best.program, best.sets = best.program | set(effects), [*best.sets, effects]

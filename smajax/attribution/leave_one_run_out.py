@@ -6,7 +6,7 @@ others (infinitesimal jackknife; Giordano et al. 2019),
 $$\delta = -(H - H_r)^{-1} g_r,\quad H = J^T J/s^2 + \Lambda,\ g_r = J_r^T r_r/s^2.$$
 
 The run is then simulated at $\theta + \delta$, not extrapolated. Where the step makes the others worse by more than their
-noise it is too long to be believed, and those fits are made.
+noise, or the run has no numbers there, it is too long to be believed, and those fits are made.
 """
 
 from __future__ import annotations
@@ -55,7 +55,9 @@ def left_out(joint: JointParameters, model: FittedModel, error: float, program: 
     found = misfits(problem, points)
     others = np.asarray([_cost(one, error, owner != part) for part, one in enumerate(found)])
     before = np.asarray([_cost(whole, error, owner != part) for part in range(len(points))])
-    doubtful = np.flatnonzero(~(others < before + BELIEVED))
+    # Where the run itself has no numbers there, the fit is made: it goes nowhere where a run has none.
+    numbers = np.asarray([np.isfinite(one[owner == part]).all() for part, one in enumerate(found)])
+    doubtful = np.flatnonzero(~(others < before + BELIEVED) | ~numbers)
     if doubtful.size:
         tasks = [problem.task(model.names, joint.bounds, values, (parts != part).astype(float)) for part in doubtful]
         fits = levenberg_marquardt(problem, tasks, FitSettings(max_steps=STEPS, tolerance=TOLERANCE))

@@ -1,7 +1,7 @@
 """Directions of derivatives along which one run of a problem changes, put together into the runs of its compiled program.
 
-A run of the program computes several directions. Values of other runs' own change nothing of a run, and fits that leave it out
-ask nothing of it: what nobody needs is zero and takes no time.
+A run of the program computes several directions. Values of other runs' own change nothing of a run, and of a run that a fit leaves out
+nobody needs a derivative: what nobody needs is zero and takes no time. Outputs are of all runs: a fit goes nowhere where one has no numbers.
 """
 
 from __future__ import annotations
@@ -21,23 +21,22 @@ class NeededDirections(NamedTuple):
 
     @classmethod
     def of(cls, points: np.ndarray, tangents: np.ndarray, asked: np.ndarray, each: int) -> NeededDirections:
-        """Of what one run depends on, at points (M, P) along tangents (M, S, P); `asked` (M,): at which its outputs are asked for; `each`: directions of a run."""
+        """Of what one run depends on, at points (M, P) along tangents (M, S, P); `asked` (M,): at which its derivatives are asked for; `each`: directions of a run."""
         count, directions, size = tangents.shape
         needed = tangents.any(axis=2) & asked[:, None]
         order = np.argsort(~needed, axis=1, kind="stable")
         groups = -(-directions // each)
         filled = np.zeros((count, groups * each, size))
-        filled[:, :directions] = np.take_along_axis(tangents, order[..., None], axis=1)
+        filled[:, :directions] = np.take_along_axis(tangents * needed[..., None], order[..., None], axis=1)
         # The outputs alone take a run as well.
-        runs = np.where(asked, np.maximum(-(-needed.sum(axis=1) // each), 1), 0)
+        runs = np.maximum(-(-needed.sum(axis=1) // each), 1)
         taken = np.arange(groups) < runs[:, None]
         return cls(points[np.nonzero(taken)[0]], filled.reshape(count, groups, each, size)[taken], order, taken)
 
     def predicted(self, outputs: np.ndarray) -> np.ndarray:
-        """Outputs at each point, (M, ...), zero where they are not asked for, from those of each run, (K, ...)."""
-        found = np.zeros((len(self.taken), *outputs.shape[1:]))
-        runs, asked = self.taken.sum(axis=1), self.taken[:, 0]
-        found[asked] = outputs[(np.cumsum(runs) - runs)[asked]]
+        """Outputs at each point, (M, ...), from those of each run, (K, ...)."""
+        runs = self.taken.sum(axis=1)
+        found: np.ndarray = outputs[np.cumsum(runs) - runs]
         return found
 
     def derivatives(self, along: np.ndarray) -> np.ndarray:

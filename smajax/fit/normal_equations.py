@@ -53,7 +53,7 @@ def costs(
     points = np.stack([task.values_at(y) for task, y in zip(tasks, ys, strict=True)])
     measured = [problem.measured] * len(tasks) if outputs is None else outputs
     found = []
-    for one in zip(tasks, ys, points, predicted_at(problem, points, asked=_with_weight(tasks)), measured, strict=True):
+    for one in zip(tasks, ys, points, predicted_at(problem, points), measured, strict=True):
         value = _residual(problem, *one)
         with np.errstate(over="ignore", invalid="ignore"):
             found.append(float(value @ value))

@@ -137,26 +137,15 @@ def chunks(problem: Problem, count: int, directions: int = 1) -> list[slice]:
     return [slice(start, start + at_once) for start in range(0, count, at_once)]
 
 
-def predicted_at(
-    problem: Problem,
-    points: Sequence[np.ndarray] | np.ndarray,
-    fitted: bool = True,
-    asked: np.ndarray | None = None,
-) -> np.ndarray:
-    """Predicted sensor outputs at points (M, P): (M, series, N), SI.
-
-    `fitted`: whether the problem is, so that a program with derivatives is there. `asked`, (M, R): of which runs at least, None: of all.
-    """
+def predicted_at(problem: Problem, points: Sequence[np.ndarray] | np.ndarray, fitted: bool = True) -> np.ndarray:
+    """Predicted sensor outputs at points (M, P): (M, series, N), SI. `fitted`: whether the problem is, so that a program with derivatives is there."""
     rows = np.asarray(points, dtype=float)
     parts = chunks(problem, len(rows))
     if len(parts) > 1:
-        wanted = [None if asked is None else asked[part] for part in parts]
-        return np.concatenate(
-            [predicted_at(problem, rows[part], fitted, one) for part, one in zip(parts, wanted, strict=True)]
-        )
+        return np.concatenate([predicted_at(problem, rows[part], fitted) for part in parts])
     if fitted and len(rows) <= FEW:
         zero = np.zeros((len(rows), 1, rows.shape[1]))
-        return predicted_and_derivatives(problem, rows, zero, asked)[0]
+        return predicted_and_derivatives(problem, rows, zero)[0]
     outputs = []
     for number, run in enumerate(_runs(problem)):
         scalars = _columns("value", _of_run(problem, rows, number))
@@ -203,36 +192,22 @@ def predicted_and_derivatives(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Predicted sensor outputs at points (M, P), and their derivatives along tangents (M, S, P).
 
-    Arrays (M, series, N) and (M, S, series, N). `asked`, (M, R): of which runs they are at each point, None: of all; zero of the others.
+    Arrays (M, series, N) and (M, S, series, N). `asked`, (M, R): of which runs derivatives are, at each point, None: of all; zero of the others.
     """
     count, directions = tangents.shape[:2]
     if directions == 0:
-        return predicted_at(problem, points, asked=asked), np.zeros((count, 0, *problem.batch.output.shape))
+        return predicted_at(problem, points), np.zeros((count, 0, *problem.batch.output.shape))
     asked = np.ones((count, problem.batch.runs), bool) if asked is None else asked
     needed, calls = [], list[Callable[[int], tuple[np.ndarray, np.ndarray]]]()
     for number, run in enumerate(_runs(problem)):
-        own = NeededDirections.of(
-            _of_run(problem, points, number),
-            _of_run(problem, tangents, number),
-            asked[:, number],
-            directions_of(problem),
-        )
-        needed.append(own)
-        scalars = {**_columns("value", own.points), **_columns("tangent", own.tangents)}
-        made = _program(problem, _along, run, scalars)
-        calls.append(
-            partial(made, run, scalars) if len(own.points) else partial(_nothing, problem)
-        )  # and the number of threads
+        at, along = (_of_run(problem, part, number) for part in (points, tangents))
+        needed.append(NeededDirections.of(at, along, asked[:, number], directions_of(problem)))
+        scalars = {**_columns("value", needed[-1].points), **_columns("tangent", needed[-1].tangents)}
+        calls.append(partial(_program(problem, _along, run, scalars), run, scalars))  # and the number of threads
     results = _side_by_side(calls)
     predicted = [own.predicted(value[:, 0]) for own, (value, _) in zip(needed, results, strict=True)]
     derivatives = [own.derivatives(along) for own, (_, along) in zip(needed, results, strict=True)]
     return np.concatenate(predicted, axis=1), np.concatenate(derivatives, axis=2)
-
-
-def _nothing(problem: Problem, threads: int) -> tuple[np.ndarray, np.ndarray]:
-    """Of a run that nobody asks for."""
-    empty = np.zeros((0, directions_of(problem), len(problem.batch.outputs), problem.batch.output.shape[-1]))
-    return empty, empty
 
 
 def slopes_at(problem: Problem, points: Sequence[np.ndarray], names: Sequence[str]) -> np.ndarray:

@@ -104,7 +104,7 @@ def _differentiable(given: tuple[System, Stage, Inputs]) -> Solution:
     """The same, and one linear correction: its derivatives, the second too, are then those of the equations' root.
 
     Only where a derivative is taken: what the solver leaves is of the size of its tolerance squared, and moves a derivative
-    by some 1e-8 of itself. Where JAX computes what is known beforehand it follows no rule but goes through the correction: without one,
+    by some 2e-6 of its largest with one step a sample, no more than another order of the same sums does. Where JAX computes what is known beforehand it follows no rule but goes through the correction: without one,
     forward over reverse mode takes the root for a constant. Derivatives of the first order alone do without.
     """
     system, stage, inputs = given

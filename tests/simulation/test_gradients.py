@@ -50,6 +50,24 @@ def test_derivatives_in_every_base_parameter_agree_with_differences(case: str, e
     compare(CASES[case][0], open_loop(CASES[case][1], DT), engine=engine)
 
 
+@pytest.mark.parametrize("case", ["dead_weight", "bias_spring"])
+def test_a_run_that_is_differentiated_once_has_the_same_derivative(case: str) -> None:
+    system, inputs = CASES[case]
+
+    def position(once: bool) -> tuple[np.ndarray, np.ndarray]:
+        def run(value: jax.Array) -> jax.Array:
+            return simulate(set_parameters(system, {"convection_coefficient": value}), inputs, DT, once=once).position
+
+        value = jnp.asarray(120.0)
+        values, slopes = jax.jit(lambda: jax.jvp(run, (value,), (jnp.ones_like(value),)))()
+        return np.asarray(values), np.asarray(slopes)
+
+    (values, slopes), (alone, slopes_once) = position(False), position(True)
+    np.testing.assert_allclose(alone, values, atol=1e-5 * np.abs(values).max())
+    assert np.abs(slopes).max() > 0.0
+    np.testing.assert_allclose(slopes_once, slopes, atol=1e-4 * np.abs(slopes).max())
+
+
 @pytest.mark.slow
 def test_reverse_mode_agrees_with_forward_mode() -> None:
     system, inputs = CASES["dead_weight"]

@@ -80,6 +80,7 @@ def _sum(powers: Float[Array, 11], at: _Place) -> Scalar:
 @jax.jit  # traced once and not at each of the hundred places of a step
 def spline(powers: Float[Array, 11], share: Scalar) -> Scalar:
     """The function at `share` of its range, 0..1, of shape (); outside of that what it is at the nearer end."""
+    assert jnp.ndim(share) == 0, f"a share of shape {jnp.shape(share)}: `jax.vmap` takes `spline` over an array"
     value: Scalar = _spline((powers, share))
     return value
 
