@@ -205,7 +205,7 @@ class _Stage:
         return likelier[0] if likelier else None
 
     def _asked(self, search: JointSearch, found: FittedModel) -> AskedFor:
-        """Unknown functions beside the base model, whose values of presets are free in them as well."""
+        """Unknown functions beside the base model, whose values of presets are free in them as well. `found`: the likeliest model, beside which they may be asked for when the search has ended."""
         if not self.asked:
             self.asked.append(asked_for(self.setting, search.fitted[()], found.effects))
         search.lacking = self.asked[0]

@@ -64,7 +64,7 @@ def smallest_program(search: JointSearch, effects: Sequence[str]) -> tuple[str, 
 
 
 def program_compiled(search: JointSearch, effects: Effects, beside: Effects) -> Effects:
-    """For a fit of a set of effects: that of the programs compiled, that of `beside` among them, in which it takes less time than to compile one of its own; else that."""
+    """The program in which a set of effects is fitted: one of those compiled, of which that of `beside` is one, or its own where that takes less time."""
     programs = [search.joint.ordered(one) for one in (*search.programs, beside)]
     return compiled_for(effects, programs, samples_of(search.joint.problem))
 

@@ -11,7 +11,7 @@ import numpy as np
 from smajax.engine.arithmetic import ELEMENTWISE, select
 from smajax.engine.by_numpy import by_jax, by_numpy
 from smajax.engine.loop import Loop
-from smajax.engine.memory import constants, copy, in_memory, in_registers, mapped, row, write
+from smajax.engine.memory import copy, in_memory, in_registers, literals, mapped, row, write
 from smajax.engine.text import Array, Lane, Text, Unsupported, scalar_type
 from smajax.engine.values import SMALL, Filled, Held, Stored, Value, held, is_known, size_of
 
@@ -359,7 +359,7 @@ def _dot_general(text: Text, params: Any, given: list[Value], out: Array, kinds:
     if left_batch or right_batch or set(kinds) != {out.dtype} or out.dtype == "bool":
         raise Unsupported("products of matrices in batches, of truth values, or of different kinds of numbers")
     left, right = (
-        np.asarray(constants(text, np.asarray(one)) if is_known(one) else in_registers(text, one)) for one in given
+        np.asarray(literals(text, np.asarray(one)) if is_known(one) else in_registers(text, one)) for one in given
     )
     count = prod([left.shape[axis] for axis in left_axes])
     rows = np.moveaxis(left, left_axes, range(-len(left_axes), 0)).reshape(-1, count)

@@ -30,10 +30,10 @@ def in_registers(text: Text, value: Value) -> Held:
         return held([value.lane] * size_of(value), value.shape)
     if isinstance(value, Stored):
         return held([_element(text, value, str(k)) for k in range(value.size)], value.shape)
-    return constants(text, value)
+    return literals(text, value)
 
 
-def constants(text: Text, value: np.ndarray) -> Held:
+def literals(text: Text, value: np.ndarray) -> Held:
     """A known array of any size, which takes no registers before its numbers are used."""
     dtype = name_of(value.dtype)
     return held([text.constant(one, dtype) for one in value.ravel()], value.shape)
