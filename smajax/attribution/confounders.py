@@ -14,7 +14,7 @@ from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.optimum import at_optimum
 from smajax.attribution.score_test import scaled
-from smajax.attribution.side_by_side import smallest_program
+from smajax.attribution.side_by_side import program_compiled
 from smajax.attribution.traces import Traces, traces_at
 from smajax.data.experiment.record import Run
 from smajax.fit.design import candidate_problem
@@ -120,7 +120,7 @@ def _in_place_of(
     for place, model in enumerate(models):
         (other,) = set(model.effects) - rest
         if place < REFINED and log_likelihood_ratio(search.joint, model, found, error) > -NEAR:
-            yield other, at_optimum(search, model, error, smallest_program(search, model.effects))
+            yield other, at_optimum(search, model, error, program_compiled(search, model.effects))
         else:
             yield other, model
 

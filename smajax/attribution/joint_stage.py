@@ -36,7 +36,7 @@ from smajax.attribution.optimum import (
 )
 from smajax.attribution.reasons import LikelierModel, NoLikelierModel, Reason, StepDependent
 from smajax.attribution.same_as_parameters import said_by_parameters
-from smajax.attribution.side_by_side import fitted_from, smallest_program
+from smajax.attribution.side_by_side import fitted_from, program_compiled
 from smajax.attribution.step_size_check import gain_kept_at_half_step
 from smajax.attribution.unknown.search import AskedFor, asked_for
 from smajax.attribution.unknown.terms import UNKNOWN
@@ -183,7 +183,7 @@ class _Stage:
 
     def _without_runs(self, search: JointSearch, model: FittedModel) -> tuple[Left, ...]:
         """What is left of the others without one run, and without two."""
-        return left_without(self.setting, model, smallest_program(search, model.effects))
+        return left_without(self.setting, model, program_compiled(search, model.effects))
 
     def before_the_end(self, search: JointSearch, found: FittedModel) -> FittedModel | None:
         """One effect that is likelier than those of `found`, in an equation where an unknown function is likelier than these too."""

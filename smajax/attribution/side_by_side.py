@@ -56,16 +56,10 @@ def grouped_sets(
     return found
 
 
-def smallest_program(search: JointSearch, effects: Sequence[str]) -> tuple[str, ...]:
-    """Of the programs that are compiled the smallest that computes a set of effects; without one the set itself."""
+def program_compiled(search: JointSearch, effects: Effects, *more: Effects) -> Effects:
+    """The program in which a set of effects is fitted: one of those compiled, of which `more` are some, or its own where that takes less time."""
     # What an earlier search carried may be in the base model since.
-    programs = [search.joint.ordered(one) for one in search.programs]
-    return min((one for one in programs if set(effects) <= set(one)), key=len, default=tuple(effects))
-
-
-def program_compiled(search: JointSearch, effects: Effects, beside: Effects) -> Effects:
-    """The program in which a set of effects is fitted: one of those compiled, of which that of `beside` is one, or its own where that takes less time."""
-    programs = [search.joint.ordered(one) for one in (*search.programs, beside)]
+    programs = [search.joint.ordered(one) for one in (*search.programs, *more)]
     return compiled_for(effects, programs, samples_of(search.joint.problem))
 
 

@@ -148,9 +148,8 @@ def expanded(equation: Any) -> Any | None:
         return _traced_for(stands_for, primitive.name, kinds)
 
 
-_traced: dict[
-    Hashable, Any
-] = {}  # programs, by primitive, parameters and kinds: few, and each asked for in every program
+# Programs, by primitive, parameters and kinds: few, and each asked for in every program.
+_traced: dict[Hashable, Any] = {}
 
 
 def _traced_for(stands_for: Callable[..., Any], name: str, kinds: Sequence[tuple[tuple[int, ...], str, bool]]) -> Any:

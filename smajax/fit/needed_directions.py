@@ -43,8 +43,10 @@ class NeededDirections(NamedTuple):
         """Derivatives along each direction, (M, S, ...), zero along those that nobody needs, from those of each run, (K, directions of a run, ...)."""
         count, directions = self.order.shape
         each, shape = along.shape[1], along.shape[2:]
-        sorted_ones = np.zeros((*self.taken.shape, each, *shape))
-        sorted_ones[self.taken] = along
+        sorted_ones = along
+        if not self.taken.all():  # as a rule all are, and need no second copy
+            sorted_ones = np.zeros((*self.taken.shape, each, *shape))
+            sorted_ones[self.taken] = along
         sorted_ones = sorted_ones.reshape(count, -1, *shape)[:, :directions]
         if (self.order == np.arange(directions)).all():
             return sorted_ones
