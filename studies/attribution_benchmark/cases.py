@@ -153,5 +153,5 @@ def truth(case: Case) -> Truth:
     found = {name: ruler.find(name, case.strength) for name in case.effects}
     effects = {name: f.coefficient for name, f in found.items()}
     alone = len(found) == 1
-    together = next(iter(found.values())).strength if alone else ruler.together(effects)
+    together = next(iter(found.values())).strength if alone else ruler.strength(effects)
     return Truth(case.rig, wire, effects, found, together)

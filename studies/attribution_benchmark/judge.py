@@ -38,6 +38,7 @@ CALLED: dict[str, tuple[str, ...]] = {
 }
 EQUATIONS = ("heat", "electrical", "kinetics", "constitutive", "mechanics", "sensor", "input")
 NOTHING, OUTSIDE = "nothing", "not in the library"
+REACHED = 0.8  # of the strength asked for: a case that comes to less is counted where it comes to
 CONFUSABLE = 0.05  # weight from which on a confounder counts as named
 
 
@@ -61,6 +62,12 @@ class Judged:
     held_out_before: float
     held_out_after: float
     seconds: float
+    weakest: float | None = None  # strength of the weakest of its effects, each alone; None: not written down
+
+    @property
+    def full(self) -> bool:
+        """Whether each of several effects has the strength that was asked for: a physical limit may lie below."""
+        return (self.strength if self.weakest is None else self.weakest) >= REACHED * self.asked
 
     @property
     def several(self) -> bool:
@@ -157,6 +164,7 @@ def judge(truth: Mapping[str, Any], report: Mapping[str, Any], seconds: float) -
         held_out_before=_error(report["runs"], "held-out", "before", noise),
         held_out_after=_error(report["runs"], "held-out", "after", noise),
         seconds=seconds,
+        weakest=min((float(one["strength"]) for one in truth["effects"].values()), default=0.0),
     )
 
 

@@ -1,7 +1,7 @@
 """How strong an effect is: what of its change in the readings no refit of the base model takes up, in noises.
 
 The refit is that of the unknowns of the experiment file, of the values of the sheet within their widths and of each run's zero,
-on noise-free readings, by steps of Gauss and Newton with the derivatives at the truth. The root mean square of what is left over
+on noise-free readings, by Levenberg and Marquardt's steps until they gain nothing. The root mean square of what is left over
 the noise is the strength.
 """
 
@@ -21,16 +21,21 @@ from studies.attribution_benchmark.rigs import Rig, value
 from studies.attribution_benchmark.sensor import reading
 
 Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
 TOLERANCE = 0.1  # of the strength asked for
 TRIALS = 8
-REFITS = 3  # steps at most
-NOTHING = 0.05  # noises: a rest that counts as none
-ENOUGH = 0.95  # a step that leaves more of the rest than this share is the last
 CLOSER = 0.7  # in logarithms, towards what can be simulated
 DEGREES = 0.1  # steps of the derivatives: of a temperature, K
 SHARE = 2e-3  # of all else
+STEPS = 12  # tried with one set of derivatives, at most
+RENEWED = 3  # times that the derivatives are taken anew where the refit has come to, at most
+NOTHING = 0.05  # noises: a rest that counts as none
+IDLE = 3  # steps that gain next to nothing, one after the other, end a refit
+ENOUGH = 0.8  # of the strength asked for: what leaves less is not refitted further, for it is too little
+GAINED = 0.97  # a step that leaves more of the rest than this share gains next to nothing
+FIRST_DAMPING = 1e-3  # of the derivatives' squares, each in its own size
 # Of a simulation: ranges meet or vanish, or the modes chatter.
-NO_SUCH_WIRE = (ValueError, RuntimeError, ZeroDivisionError)
+NO_SUCH_WIRE = (ValueError, RuntimeError, ZeroDivisionError, OverflowError)
 
 
 @dataclass(frozen=True)
@@ -40,6 +45,15 @@ class Found:
     coefficient: float
     strength: float
     capped: bool
+
+
+@dataclass(frozen=True)
+class Refit:
+    """The wire that a refit came to, the derivatives there, and the root mean square of what it leaves, in noises."""
+
+    wire: Wire
+    slopes: Matrix
+    left: float
 
 
 class Ruler:
@@ -52,13 +66,7 @@ class Ruler:
         self._values: dict[tuple[object, ...], list[Vector]] = {}  # a sensor's effects need no new simulation
         self.runs = [run for run in rig.runs(wire) if run.role == "fit"]
         self.null = self.readings(wire, {})
-        matrix = np.column_stack(self._columns())
-        rows = np.zeros((len(widths), matrix.shape[1]))
-        for row, (name, spread) in enumerate(self.spread.items()):
-            rows[row, self.names.index(name)] = 1.0 / spread
-        matrix = np.concatenate([matrix, rows])
-        self.sizes = np.linalg.norm(matrix, axis=0)
-        self.basis, self.corner = np.linalg.qr(matrix / self.sizes)
+        self.slopes = self._slopes(wire, self.null)
 
     def readings(self, wire: Wire, effects: Effects) -> Vector:
         """Noise-free readings of all fit runs, in noises."""
@@ -69,80 +77,124 @@ class Ruler:
         times, stroke = self.rig.clock.times, self.rig.stroke
         return np.concatenate([reading(times, x, effects, stroke) for x in self._values[key]]) / self.rig.noise
 
-    def _columns(self) -> list[Vector]:
+    def _slopes(self, wire: Wire, here: Vector) -> Matrix:
+        """Derivatives of the rests by the values at a wire with these readings: a column each."""
         columns = []
         for name in self.names:
-            nominal = getattr(self.wire, name)
-            step = DEGREES if name.endswith(("start", "finish")) else SHARE * nominal
-            columns.append((self.readings(replace(self.wire, **{name: nominal + step}), {}) - self.null) / step)
-        count = self.rig.clock.count
-        for i in range(len(self.runs)):
-            zero = np.zeros(self.null.size)
-            zero[i * count : (i + 1) * count] = 1.0
-            columns.append(zero)
-        return columns
+            step = DEGREES if name.endswith(("start", "finish")) else SHARE * getattr(self.wire, name)
+            there = replace(wire, **{name: getattr(wire, name) + step})
+            sheet = [float(one == name) / spread for one, spread in self.spread.items()]
+            columns.append(np.concatenate([self._centred(self.readings(there, {}) - here) / step, sheet]))
+        return np.column_stack(columns)
 
-    def together(self, effects: Effects) -> float:
-        """`strength` of several effects, by fewer steps of the refit where these end at wires that do not exist."""
-        for refits in range(REFITS, 0, -1):
-            try:
-                return self.strength(effects, refits)
-            except NO_SUCH_WIRE:
-                continue
-        return self.strength(effects, 0)
+    def _centred(self, readings: Vector) -> Vector:
+        """About each run's own mean: a run has a zero of its own."""
+        by_run = readings.reshape(len(self.runs), -1)
+        return (by_run - by_run.mean(axis=1, keepdims=True)).ravel()
 
-    def strength(self, effects: Effects, refits: int = REFITS) -> float:
-        """Root mean square of what a refit by so many steps leaves of the effects, in noises."""
+    def _rests(self, shown: Vector, wire: Wire) -> Vector:
+        """What a wire leaves of the readings, and how far its values of the sheet are from the true ones, in widths."""
+        off = [(getattr(self.wire, name) - getattr(wire, name)) / one for name, one in self.spread.items()]
+        return np.concatenate([self._centred(shown - self.readings(wire, {})), off])
+
+    def _left(self, rests: Vector) -> float:
+        return float(np.sqrt(np.mean(rests[: self.null.size] ** 2)))
+
+    def strength(self, effects: Effects) -> float:
+        """Root mean square of what a refit leaves of the effects, in noises."""
+        return self.refit(effects).left
+
+    def refit(self, effects: Effects, begin: Refit | None = None, below: float = NOTHING) -> Refit:
+        """The base model fitted to the readings with the effects, from the true wire or another; ended early where less than `below` is left."""
         shown = self.readings(self.wire, effects)
-        wire, rest = self.wire, shown - self.null
-        left = self._without_zeros(rest)
-        for _ in range(refits):
-            off = [(getattr(self.wire, name) - getattr(wire, name)) / one for name, one in self.spread.items()]
-            move = np.linalg.solve(self.corner, self.basis.T @ np.concatenate([rest, off])) / self.sizes
-            moved = {name: getattr(wire, name) + float(d) for name, d in zip(self.names, move, strict=False)}
-            wire = replace(wire, **moved)
-            if not _possible(wire):
+        wire, slopes = (self.wire, self.slopes) if begin is None else (begin.wire, begin.slopes)
+        rests = self._rests(shown, wire)
+        for renewed in range(RENEWED + 1):
+            before = self._left(rests)
+            wire, rests = self._refitted(shown, wire, rests, slopes, below)
+            left = self._left(rests)
+            if renewed == RENEWED or left < below or (renewed and left > GAINED * before):
                 break
-            rest = shown - self.readings(wire, {})
-            now = self._without_zeros(rest)
-            done, left = now > ENOUGH * left, min(now, left)
-            if done or left < NOTHING:
+            try:
+                slopes = self._slopes(wire, self.readings(wire, {}))
+            except NO_SUCH_WIRE:
                 break
-        return left
+        return Refit(wire, slopes, self._left(rests))
 
-    def _without_zeros(self, rest: Vector) -> float:
-        """Root mean square about each run's own mean."""
-        by_run = rest.reshape(len(self.runs), -1)
-        return float(np.sqrt(np.mean((by_run - by_run.mean(axis=1, keepdims=True)) ** 2)))
+    def _refitted(self, shown: Vector, wire: Wire, rests: Vector, slopes: Matrix, below: float) -> tuple[Wire, Vector]:
+        """Where the steps from a wire come to, and its rests; after each the derivatives are corrected by what it did (Broyden)."""
+        sizes = np.linalg.norm(slopes, axis=0)
+        matrix = slopes / sizes
+        damping, idle = FIRST_DAMPING, 0
+        for _ in range(STEPS):
+            normal = matrix.T @ matrix
+            move = np.linalg.solve(normal + damping * np.eye(len(normal)), matrix.T @ rests)
+            values = {name: getattr(wire, name) + float(d) for name, d in zip(self.names, move / sizes, strict=True)}
+            there = replace(wire, **values)
+            try:
+                if not _possible(there):
+                    raise ValueError("no such wire")
+                new = self._rests(shown, there)
+            except NO_SUCH_WIRE:
+                damping *= 10.0
+                continue
+            matrix = matrix + np.outer(rests - new - matrix @ move, move) / float(move @ move)
+            better = float(new @ new) < float(rests @ rests)
+            idle = 0 if self._left(new) < GAINED * self._left(rests) else idle + 1
+            damping *= 0.2 if better else 5.0
+            if better:
+                wire, rests = there, new
+            if self._left(rests) < below or idle >= IDLE:
+                break
+        return wire, rests
 
     def find(self, name: str, wanted: float, others: Mapping[str, float] | None = None) -> Found:
         """Coefficient of an effect at which its strength, beside `others`, is `wanted`; secant in logarithms."""
         effect, others = EFFECTS[name], others or {}
         sign, largest = math.copysign(1.0, effect.first), math.log(abs(effect.largest))
 
-        def miss(size: float) -> float:
-            strength = self.strength({**others, name: sign * math.exp(size)})
-            return math.log(max(strength, 1e-9) / wanted)
+        def effects_of(size: float) -> Effects:
+            return {**others, name: sign * math.exp(size)}
 
         trials: list[tuple[float, float]] = []
-        size = min(math.log(abs(effect.first)), largest)
+        refits: dict[float, Refit] = {}
+        size, begin = min(math.log(abs(effect.first)), largest), None
         for _ in range(TRIALS):
             try:
-                trials.append((size, miss(size)))
+                refit = self.refit(effects_of(size), begin, ENOUGH * wanted)
             except NO_SUCH_WIRE:
                 largest = size - CLOSER
                 size = largest
                 continue
+            trials.append((size, math.log(max(refit.left, 1e-9) / wanted)))
+            refits[size] = refit
             best = min(trials, key=lambda trial: abs(trial[1]))
             if abs(best[1]) < TOLERANCE or (size == largest and trials[-1][1] < 0):
                 break
-            size = min(_next(trials), largest)
+            following = min(_next(trials), largest)
+            begin, size = self._moved(refit, math.exp(following - size)), following
         if not trials:
             raise ValueError(
                 f"{name} at {effect.first:g} cannot be simulated on {self.rig.name}; expected a smaller first"
             )
         size, missed = min(trials, key=lambda trial: abs(trial[1]))
-        return Found(sign * math.exp(size), wanted * math.exp(missed), size >= largest and missed < -TOLERANCE)
+        if abs(missed) >= TOLERANCE and all(one < 0 for _, one in trials):
+            size = max(refits)  # capped
+        refit = refits[size]
+        if refit.left < ENOUGH * wanted:  # not refitted to the end
+            refit = self.refit(effects_of(size), refit)
+        return Found(sign * math.exp(size), refit.left, refit.left < math.exp(-TOLERANCE) * wanted)
+
+    def _moved(self, refit: Refit, share: float) -> Refit | None:
+        """About where a refit to effects of this share of the size comes to; None: no such wire."""
+        values = {name: getattr(self.wire, name) for name in self.names}
+        there = {name: one + share * (getattr(refit.wire, name) - one) for name, one in values.items()}
+        wire = replace(self.wire, **there)
+        try:
+            self.readings(wire, {})
+        except NO_SUCH_WIRE:
+            return None
+        return replace(refit, wire=wire) if _possible(wire) else None
 
 
 def _possible(wire: Wire) -> bool:
