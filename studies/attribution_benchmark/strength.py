@@ -33,6 +33,7 @@ NOTHING = 0.05  # noises: a rest that counts as none
 IDLE = 3  # steps that gain next to nothing, one after the other, end a refit
 ENOUGH = 0.8  # of the strength asked for: what leaves less is not refitted further, for it is too little
 GAINED = 0.97  # a step that leaves more of the rest than this share gains next to nothing
+ABSURD = 10.0  # times the rest: of a step that leaves so much nothing is learnt
 FIRST_DAMPING = 1e-3  # of the derivatives' squares, each in its own size
 # Of a simulation: ranges meet or vanish, or the modes chatter.
 NO_SUCH_WIRE = (ValueError, RuntimeError, ZeroDivisionError, OverflowError)
@@ -135,6 +136,8 @@ class Ruler:
                 if not _possible(there):
                     raise ValueError("no such wire")
                 new = self._rests(shown, there)
+                if not self._left(new) < ABSURD * self._left(rests):
+                    raise ValueError("no derivatives hold so far")
             except NO_SUCH_WIRE:
                 damping *= 10.0
                 continue
