@@ -54,7 +54,9 @@ def _truth(kind: str, effects: dict[str, str], outside: bool = False, strength: 
         "rig": "rig",
         "strength_asked": 10.0,
         "strength_together": strength,
-        "effects": {name: {"group": group, "outside": outside} for name, group in effects.items()},
+        "effects": {
+            name: {"group": group, "outside": outside, "strength": strength} for name, group in effects.items()
+        },
     }
 
 
@@ -125,7 +127,14 @@ def test_the_benchmarks_tables_and_picture_are_written(tmp_path: Path) -> None:
     assert {one.case for one in missed(cases)} == {"rig-single", "rig-pair"}
     told = {what: measured for what, _, measured in bars(cases)}
     assert told["both effects of a pair"] == "0 of 1 (0 %)"
-    assert told["a case in under two minutes"] == "7 of 8 (88 %)"
+    short = replace(CASES["one of two"][0], weakest=2.0)  # ten noises were asked for
+    told_with_it = {what: measured for what, _, measured in bars([*cases, short])}
+    assert told_with_it["both effects of a pair"] == "0 of 1 (0 %)"
+    assert (
+        told_with_it["all effects of a pair or triple of which one has less than the strength asked for"]
+        == "0 of 1 (0 %)"
+    )
+    assert told["a case in under three minutes"] == "8 of 8 (100 %)"
     assert strength_of(cases[0]) == 10.0
     # What the generator calls ten noises, and a refit to its end leaves next to nothing of.
     assert strength_of(replace(cases[0], fit_before=1.5)) == 1.0

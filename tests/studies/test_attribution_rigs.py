@@ -150,7 +150,8 @@ def test_a_case_is_as_strong_as_it_says() -> None:
         assert not found.found["smooth_transformation"].capped
         measured = Ruler(found.rig, found.wire).strength(found.effects)
         assert measured == pytest.approx(strength, rel=0.2)
-        assert measured == pytest.approx(found.together, rel=1e-6)
+        # The search begins each refit where the one before came to.
+        assert measured == pytest.approx(found.together, rel=0.05)
 
 
 def test_a_case_is_the_same_each_time(tmp_path) -> None:

@@ -13,6 +13,7 @@ from smajax.data.experiment.load import load_experiment
 from smajax.data.model_catalogue import CATALOGUE
 from smajax.fit.base_model import base_model
 from studies.attribution_benchmark.cases import Case, true_wire
+from studies.attribution_benchmark.effects import EFFECTS
 from studies.attribution_benchmark.rigs import RIGS
 from studies.attribution_benchmark.sheet import WIDTHS, drawn_about, on_the_sheet
 from studies.attribution_benchmark.strength import Ruler
@@ -61,3 +62,23 @@ def test_a_strength_is_what_the_values_of_the_sheet_leave_too() -> None:
     )
     assert held == pytest.approx(Ruler(rig, rig.wire).strength(effects), rel=1e-3)
     assert known < 0.3 * held
+
+
+def test_what_other_values_of_the_wire_say_as_well_has_no_strength() -> None:
+    """The coupon's slopes are unknowns; three steps without damping left 4.6 noises of this."""
+    rig = RIGS["coupon"]
+    ruler = Ruler(rig, rig.wire, on_the_sheet(rig))
+    effects = {"different_slopes": 0.1}
+    assert np.std(ruler.readings(rig.wire, effects) - ruler.null) > 10.0
+    assert ruler.strength(effects) < 0.05
+
+
+def test_an_effect_too_weak_by_nature_is_capped_with_the_strength_that_it_has() -> None:
+    """An expansion is mostly another thermal modulus, however large it is."""
+    rig = RIGS["coupon"]
+    ruler = Ruler(rig, rig.wire, on_the_sheet(rig))
+    found = ruler.find("thermal_expansion", 100.0)
+    assert found.capped
+    assert found.coefficient == pytest.approx(EFFECTS["thermal_expansion"].largest)
+    assert 0.0 < found.strength < 50.0
+    assert found.strength <= 1.1 * ruler.strength({"thermal_expansion": found.coefficient})
