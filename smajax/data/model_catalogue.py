@@ -81,6 +81,7 @@ def _scale(system: System) -> Scale:
         found = np.asarray(heating_power(system, martensite, given) / cooling, dtype=np.float64)
         return found[:count] if found.ndim else found
 
+    values = parameter_values(system.load)
     return Scale(
         float(wire.wire_length),
         float(heat.ambient_temperature),
@@ -88,6 +89,7 @@ def _scale(system: System) -> Scale:
         warming,
         system.load.reading[0],
         (ohms[0], ohms[1]),
+        {one.name: values[one.name] for one in parameters(system.load).values() if one.unit == "kg"},
     )
 
 

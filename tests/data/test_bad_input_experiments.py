@@ -209,6 +209,14 @@ def test_a_sensor_of_reversed_sign_is_a_warning_and_can_be_reversed(tmp_path: Pa
         np.testing.assert_array_equal(old.output, new.output)
 
 
+@pytest.mark.parametrize(("mass", "warned"), [("300 g", False), ("300 kg", True)])
+def test_a_load_that_no_wire_moves_is_a_warning(tmp_path: Path, mass: str, warned: bool) -> None:
+    experiment = bench(
+        tmp_path, ('drive = "voltage"\n', f'drive = "voltage"\n\n[model.parameters]\nload_mass = "{mass}"\n')
+    )
+    assert _warned(experiment, "load_mass is 300 kg; is it in g?") is warned
+
+
 def test_only_an_output_can_be_reversed(tmp_path: Path) -> None:
     said = refused("identify", bench(tmp_path, ('unit = "V"', 'unit = "V"\nreversed = true')))
     assert "channels.voltage: got reversed for an input" in said

@@ -45,7 +45,7 @@ class Scale:
 
     wire_length: m. ambient: degC. time_constant: s, of the wire's temperature. warming: inputs (n,) -> the degrees above
     the air (n,) at which the wire comes to rest under each. own: the output that the load's own sensor shows, which rises with heat.
-    resistance: ohm, of the whole wire, the least and the most of both phases; zero where it is not known.
+    resistance: ohm, of the whole wire, the least and the most of both phases; zero where it is not known. masses: kg, of the load, by their names.
     """
 
     wire_length: float
@@ -54,6 +54,7 @@ class Scale:
     warming: Callable[[Mapping[str, NDArray[np.float64]]], NDArray[np.float64]]
     own: str = "position"
     resistance: tuple[float, float] = (0.0, 0.0)
+    masses: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

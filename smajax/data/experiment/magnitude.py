@@ -84,6 +84,12 @@ def _size_warnings(runs: Sequence[ReadRun]) -> list[str]:
     return result
 
 
+def _mass_warnings(masses: Mapping[str, float]) -> list[str]:
+    """Masses of the load that no wire moves; the run's own are a channel."""
+    most, own, other = LARGEST["mass"]
+    return [f"{name} is {mass:.5g} {own}; is it in {other}?" for name, mass in masses.items() if mass > most]
+
+
 def _heating_warnings(runs: Sequence[ReadRun], scale: Scale, heats: Sequence[str]) -> list[str]:
     """What the inputs would do to a wire of the declared model with the values where the search starts."""
     warm: list[tuple[float, float, str]] = []
@@ -266,6 +272,7 @@ def magnitude_warnings(
     """All of them. scale: of the model at its known values and starts; heats: the inputs that heat the wire; offset: outputs with a zero of their own in each run."""
     result = [*_size_warnings(runs), *_exchange_warnings(runs, heats)]
     if scale is not None:
+        result += _mass_warnings(scale.masses)
         result += [*_heating_warnings(runs, scale, heats), *_stroke_warnings(runs, scale, offset)]
         result += quantity_warnings(runs, scale, heats, step, offset)
         if heats:
