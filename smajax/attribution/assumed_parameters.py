@@ -47,6 +47,6 @@ def expansion_not_given(job: Job, fitted: Mapping[str, float] = MappingProxyType
     own = {*experiment.parameters, *unknown, *(name for run in experiment.runs for name in run.parameters)}
     if not set(names) <= parameters(model).keys() or names[0] in own:
         return None
-    held = dict(zip(names, get_parameters(model, names), strict=True))
+    held = dict(zip(names, np.asarray(get_parameters(model, names)), strict=True))
     modulus, martensite, austenite = (float(fitted.get(name, held[name])) for name in names)
     return (modulus / martensite, modulus / austenite) if modulus else None

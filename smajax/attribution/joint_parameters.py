@@ -158,7 +158,7 @@ def _load_at_rest(problem: Problem) -> float:
     load = problem.system.load
     if not isinstance(load, AbstractMovingLoad):
         return 0.0
-    inputs = problem.batch.inputs
+    inputs = {name: np.asarray(series) for name, series in problem.batch.inputs.items()}
     forces = [
         float(force_at_rest(load, {name: series[run, 0] for name, series in inputs.items()}))
         for run in range(problem.batch.runs)

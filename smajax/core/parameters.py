@@ -27,6 +27,11 @@ def _as_float_array(value: Any) -> Any:
     return value if isinstance(value, jax.core.Tracer) else jnp.asarray(value, dtype=float)
 
 
+def by_numpy(values: Any) -> Any:
+    """An array of JAX whose values are known as numpy's, anything else as it is: of JAX each index into another shape is a program to compile."""
+    return np.asarray(values) if isinstance(values, jax.Array) and not isinstance(values, jax.core.Tracer) else values
+
+
 def parameter(
     unit: str, low: float, high: float, about: str, of_load: str = "", limits_command: bool = False, **kwargs: Any
 ) -> Any:
@@ -109,7 +114,11 @@ def _select(model: eqx.Module, names: Sequence[str]) -> list[Parameter]:
 
 def get_parameters(model: eqx.Module, names: Sequence[str]) -> Float[Array, " names"]:
     """The values of `names`, in that order, SI."""
-    return jnp.stack([jnp.asarray(value_at(model, entry.path), dtype=float) for entry in _select(model, names)])
+    values = [value_at(model, entry.path) for entry in _select(model, names)]
+    if any(isinstance(one, jax.core.Tracer) for one in values):
+        return jnp.stack([jnp.asarray(one, dtype=float) for one in values])
+    # By numpy: of JAX each operation is a program of its own for each number of names, which takes longer to compile than all else here.
+    return jnp.asarray(np.stack([np.asarray(one, dtype=float) for one in values]), dtype=float)
 
 
 def parameter_values(model: eqx.Module) -> dict[str, float]:
@@ -161,6 +170,7 @@ def set_parameters(model: Module, values: Mapping[str, Any]) -> Module:
 
 def set_vector(model: Module, names: Sequence[str], vector: Float[Array, " names"]) -> Module:
     """`set_parameters` from a vector in the order of `names`: the form that an optimiser differentiates."""
+    vector = by_numpy(vector)
     return set_parameters(model, {name: vector[index] for index, name in enumerate(names)})
 
 

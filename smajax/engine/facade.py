@@ -11,7 +11,6 @@ import importlib.util
 import os
 import warnings
 from collections.abc import Callable, Hashable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache, partial
@@ -21,6 +20,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar, cast, get_args
 import jax
 import numpy as np
 
+from smajax.core.beside import begun
 from smajax.core.operating_system import WINDOWS, available_cores
 from smajax.engine import xla
 from smajax.engine.arguments import (
@@ -164,12 +164,10 @@ class Program:
             if self._along.names:
                 return Coming(partial(self._by_xla, model, own))
             return Coming(xla.started(self._function, model, own, devices, block, room))
-        pool, stop = ThreadPoolExecutor(1), Event()
-        try:
-            coming = pool.submit(self, model, own, threads, stop)
-        except RuntimeError:  # no room for another thread under a cap on memory: done when it is asked for
+        stop = Event()
+        coming = begun(self, model, own, threads, stop)
+        if coming is None:  # done when it is asked for
             return Coming(partial(self, model, own, threads))
-        pool.shutdown(wait=False)
         return Coming(coming.result, stop.set)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+from concurrent.futures import Future, wait
 from threading import Event
 from typing import Any
 
@@ -11,6 +11,7 @@ import equinox as eqx
 import jax
 import numpy as np
 
+from smajax.core.beside import begun
 from smajax.core.compiling import compiling
 from smajax.engine import cache
 from smajax.engine.arguments import ONE_DIRECTION, Along, is_array
@@ -114,13 +115,7 @@ def _done(translated: Translated, quickly: bool) -> Future[Kernel]:
 
 def _begun(translated: Translated, quickly: bool) -> Future[Kernel]:
     """Compiled by another thread: LLVM lets Python go on."""
-    pool = ThreadPoolExecutor(1)
-    try:
-        coming = pool.submit(_kernel, translated, quickly)
-    except RuntimeError:  # no room for another thread under a cap on memory
-        return _done(translated, quickly)
-    pool.shutdown(wait=False)
-    return coming
+    return begun(_kernel, translated, quickly) or _done(translated, quickly)
 
 
 def _kernel(translated: Translated, quickly: bool) -> Kernel:

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
 import jax.numpy as jnp
+import numpy as np
 
 from smajax.core.names_of_runs import of_run
 from smajax.core.parameters import parameter_values
@@ -35,7 +36,7 @@ def own_values(experiment: Experiment, runs: Sequence[Run]) -> PerRun:
     own = {(one.name, run.name): one.start for one in per_run for run in runs if one.of(run.name)}
     start = [[own.get((name, run.name), 0.0) for name in names] for run in runs]
     single = tuple(dict.fromkeys(unknown.name for unknown in per_run if unknown.runs is not None))
-    whole = jnp.asarray(start, dtype=float).reshape(len(runs), len(names))
+    whole = jnp.asarray(np.asarray(start, dtype=float).reshape(len(runs), len(names)), dtype=float)
     return PerRun(names, tuple(run.name for run in runs), whole, single)
 
 
@@ -51,7 +52,7 @@ def problem_of(
     experiment: Experiment, runs: Sequence[Run], model: System, priors: Mapping[str, Prior] = MappingProxyType({})
 ) -> Problem:
     """`runs` as they were measured, with the outputs of the experiment and the values of single runs, by any `model`."""
-    sigmas = jnp.asarray([output.noise_sigma for output in experiment.outputs])
+    sigmas = np.asarray([output.noise_sigma for output in experiment.outputs], dtype=float)
     return Problem.build(
         model,
         pack(runs, experiment.step, parameter_values(model)),

@@ -78,21 +78,27 @@ def integration_error(problem: Problem, system: System, per_run: np.ndarray | No
     return _error(problem, _predicted(problem, system, chosen, own) - exact, chosen)
 
 
+def _of_tries(integration: Integration, most: np.ndarray) -> Integration:
+    return dataclasses.replace(integration, most_tries=jnp.asarray(most, dtype=float))
+
+
 def _limited(problem: Problem, integration: Integration) -> Integration:
     """With the tries of a fit, where there is a tolerance."""
     tolerance = integration.tolerance
     if tolerance is None:
         return integration
     dt = float(np.asarray(problem.batch.dt))
-    most = max(TRIES_A_SAMPLE, TRIES_A_SECOND * dt) * jnp.maximum(1.0, AT_TOLERANCE / tolerance) ** (1.0 / 3.0)
-    return dataclasses.replace(integration, most_tries=most)
+    most = max(TRIES_A_SAMPLE, TRIES_A_SECOND * dt) * np.maximum(1.0, AT_TOLERANCE / np.asarray(tolerance)) ** (
+        1.0 / 3.0
+    )
+    return _of_tries(integration, most)
 
 
 def unlimited(integration: Integration) -> Integration:
     """The same for a run that is no trial point of a fit: as many tries as it takes, by the same program."""
     if integration.most_tries is None:
         return integration
-    return dataclasses.replace(integration, most_tries=jnp.full_like(integration.most_tries, jnp.inf))
+    return _of_tries(integration, np.full(np.shape(integration.most_tries), np.inf))
 
 
 def limited_near(problem: Problem, values: np.ndarray) -> Integration:
@@ -101,15 +107,14 @@ def limited_near(problem: Problem, values: np.ndarray) -> Integration:
     The need is known to a factor of two, and not below `1 / LEAST_SHARE` of what it has.
     """
     integration, share = problem.batch.integration, LEAST_SHARE
-    most, tolerance = integration.most_tries, integration.tolerance
-    if most is None or tolerance is None:
+    if integration.most_tries is None or integration.tolerance is None:
         return integration
+    most, tolerance = np.asarray(integration.most_tries), np.asarray(integration.tolerance)
     swinging = SWINGING * float(np.asarray(problem.batch.dt)) * (AT_TOLERANCE / tolerance) ** (1.0 / 3.0)
     while share > NEARBY:
-        needed = dataclasses.replace(integration, most_tries=most / share)
+        needed = _of_tries(integration, most / share)
         if np.isfinite(predicted_at(with_integration(problem, needed), [values])).all():
-            allowed = jnp.minimum(jnp.maximum(NEARBY * most / share, swinging), most)
-            return dataclasses.replace(integration, most_tries=allowed)
+            return _of_tries(integration, np.minimum(np.maximum(NEARBY * most / share, swinging), most))
         share //= 2
     return integration
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Sequence
 from functools import partial
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -72,13 +73,17 @@ def pack(runs: Sequence[Run], dt: float, defaults: dict[str, float], integration
         short = longest - len(values)
         return np.pad(values, (0, short), mode="edge") if mode == "edge" else np.pad(values, (0, short))
 
+    def stacked(rows: Sequence[Any]) -> Array:
+        # One array that is handed over: of a list JAX compiles a program.
+        return jnp.asarray(np.asarray(rows, dtype=float), dtype=float)
+
     return RunBatch(
-        inputs={name: jnp.asarray([padded(run.inputs[name], "edge") for run in runs]) for name in channels},
-        output=jnp.asarray([padded(np.nan_to_num(series), "zero") for run in runs for series in run.outputs.values()]),
-        mask=jnp.asarray(
+        inputs={name: stacked([padded(run.inputs[name], "edge") for run in runs]) for name in channels},
+        output=stacked([padded(np.nan_to_num(series), "zero") for run in runs for series in run.outputs.values()]),
+        mask=stacked(
             [padded(np.isfinite(series).astype(float), "zero") for run in runs for series in run.outputs.values()]
         ),
-        overrides=jnp.asarray([[own[name] for name in names] for own in values]),
+        overrides=stacked([[own[name] for name in names] for own in values]),
         override_names=names,
         dt=dt,
         outputs=tuple(runs[0].outputs),
@@ -98,7 +103,10 @@ def halved(batch: RunBatch) -> RunBatch:
 
 
 def _started(
-    system: System, names: Sequence[str], values: Float[Array, " name"], inputs: dict[str, Float[Array, " time"]]
+    system: System,
+    names: Sequence[str],
+    values: Float[Array, " name"] | Sequence[Scalar],
+    inputs: dict[str, Float[Array, " time"]],
 ) -> tuple[System, State | None]:
     """`system` with one run's values of `names`, and the state it starts in where the model does not say it."""
     overrides = dict(zip(names, values, strict=True))
@@ -131,9 +139,10 @@ def _compiled_runs(
     system: System, batch: RunBatch, names: Sequence[str], values: np.ndarray
 ) -> Iterator[tuple[System, Trajectory]]:
     """Each run's system, with its `values` (R, names), and its trajectory."""
+    series = {name: np.asarray(one) for name, one in batch.inputs.items()}
     for number in range(batch.runs):
-        inputs = {name: series[number] for name, series in batch.inputs.items()}
-        here, initial = _started(system, names, jnp.asarray(values[number]), inputs)
+        inputs = {name: jnp.asarray(one[number]) for name, one in series.items()}
+        here, initial = _started(system, names, [jnp.asarray(one) for one in values[number]], inputs)
         yield here, compiled_run(here, inputs, batch.dt, batch.integration, initial)
 
 

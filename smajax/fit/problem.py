@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from smajax.core.names_of_runs import of_run, parameter_of
-from smajax.core.parameters import get_parameters, parameters, set_vector
+from smajax.core.parameters import by_numpy, get_parameters, parameters, set_vector
 from smajax.data.experiment.record import Prior
 from smajax.fit.packed_runs import RunBatch, predict_batch
 from smajax.fit.priors import Priors
@@ -89,13 +89,13 @@ class Problem(eqx.Module):
         cls,
         system: System,
         batch: RunBatch,
-        noise_sigma: float | Array,
+        noise_sigma: float | np.ndarray | Array,
         offset: bool | tuple[bool, ...],
         per_run: PerRun | None = None,
         priors: Mapping[str, Prior] = MappingProxyType({}),
     ) -> Problem:
         """`offset`: whether each run has an unknown zero of an output, one for all or one each."""
-        per_run = per_run or PerRun((), tuple(str(run) for run in range(batch.runs)), jnp.zeros((batch.runs, 0)))
+        per_run = per_run or PerRun((), tuple(str(run) for run in range(batch.runs)), np.zeros((batch.runs, 0)))
         names = (*parameters(system), *per_run.full_names)
         zero = (offset,) * len(batch.outputs) if isinstance(offset, bool) else offset
         return cls(system, names, batch, jnp.asarray(noise_sigma), zero, per_run, Priors.of(names, priors))
@@ -189,11 +189,11 @@ class Problem(eqx.Module):
 
     def system_at(self, values: Float[Array, " parameter"]) -> System:
         """The model, without the values of single runs."""
-        return set_vector(self.system, self.shared, values[: len(self.shared)])
+        return set_vector(self.system, self.shared, by_numpy(values)[: len(self.shared)])
 
     def per_run_at(self, values: Float[Array, " parameter"]) -> Float[Array, "run parameter"]:
         """The values of each run."""
-        return values[len(self.shared) :].reshape(self.per_run.start.shape)
+        return by_numpy(values)[len(self.shared) :].reshape(self.per_run.start.shape)
 
     def with_own_values(self, values: np.ndarray) -> RunBatch:
         """The runs with their own values at `values` (P,), where a simulation of the model alone finds them."""

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from smajax.attribution.findings import Findings
 from smajax.control.position_unit import unit_of
-from smajax.control.presets import controllers_for
+from smajax.control.presets import CONTROLLERS, controllers_for
 from smajax.control.run_result import RunResult
 from smajax.control.scales import seconds_for
 from smajax.core.display_units import digits
@@ -108,8 +108,9 @@ def section(steps: Sequence[Step]) -> str:
 
 def controller_of(system: System) -> str:
     """The first controller to try on a plant; "" where none works on it."""
-    able = controllers_for(system)
-    return PREFERRED if PREFERRED in able else next(iter(able), "")
+    if not CONTROLLERS[PREFERRED].missing(system):
+        return PREFERRED
+    return next(iter(controllers_for(system)), "")
 
 
 def _tuning(model: Path, system: System) -> list[Step]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import ClassVar, NamedTuple
 
@@ -110,18 +110,27 @@ class TransformationCurve(AbstractEffect, PlaceTerm):
     def _curve(self, branch: str) -> MonotoneCurve:
         if self.curves is not None:
             return self.curves[branch]
-        s = [getattr(self, name) for name in _FIELDS[branch]]
-        return monotone_curve(s[: len(_PARTS)], s[len(_PARTS) :])
+        return _curve_of([getattr(self, name) for name in _FIELDS[branch]])
+
+
+def _curve_of(parts: Sequence[Scalar]) -> MonotoneCurve:
+    return monotone_curve(parts[: len(_PARTS)], parts[len(_PARTS) :])
+
+
+@jax.jit
+def _places(parts: Sequence[Array], z: Array) -> Array:
+    """One program: of its operations one by one JAX would compile thirty."""
+    return jax.vmap(_curve_of(parts))(z)
 
 
 def branch_shape(values: Mapping[str, float], branch: str) -> BranchShape:
     """The shape of one branch ("heating" or "cooling") with coefficients by their own names; those not given are zero."""
-    curve = TransformationCurve(**{name: jnp.asarray(values.get(name, 0.0)) for name in _ALL})
+    parts = [np.asarray(values.get(name, 0.0)) for name in _FIELDS[branch]]
     reach = 12.0 * np.exp(sum(abs(values.get(name, 0.0)) for name in _FIELDS[branch]) / 2.0)
     # Dense about the middle, where a step may be sharp, and reaching as far as a tail.
     z = 0.5 + np.sinh(np.linspace(-1.0, 1.0, 20001) * np.arcsinh(reach * 50.0)) / 50.0
     in_cosine = 2.0 / np.pi * np.arcsin(np.sqrt(np.arange(11) / 10.0))
-    width = np.diff(np.interp(in_cosine, np.asarray(jax.vmap(partial(curve._moved, branch=branch))(jnp.asarray(z))), z))
+    width = np.diff(np.interp(in_cosine, np.asarray(_places(parts, z)), z))
     usual = np.diff(in_cosine)
     between, usually = float(width[1:-1].sum()), float(usual[1:-1].sum())
     return BranchShape(
