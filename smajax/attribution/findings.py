@@ -116,6 +116,11 @@ class EffectFinding:
     coefficients: dict[str, CoefficientFinding]
     evidence: dict[str, float]  # posterior_probability, alone_rmse_fit, score_p_value_at_the_end, ...
 
+    @property
+    def probability(self) -> float:
+        """Posterior probability; NaN where it was in no fitted set."""
+        return self.evidence.get("posterior_probability", float("nan"))
+
 
 @dataclass(frozen=True)
 class DroppedModel:

@@ -141,9 +141,9 @@ def _short(name: str, width: int = 26) -> str:
 def effect_probabilities(findings: Findings) -> bytes | None:
     """Posterior probability of each effect that has any, the likeliest first; None where no effect was in a fitted set."""
     shown = [
-        (effect, probability(effect))
+        (effect, effect.probability)
         for effect in ranked(findings.effects)
-        if effect.added or probability(effect) >= LEAST_PROBABILITY
+        if effect.added or effect.probability >= LEAST_PROBABILITY
     ]
     if not any(np.isfinite(value) for _, value in shown):
         return None
@@ -167,14 +167,9 @@ def effect_probabilities(findings: Findings) -> bytes | None:
     return as_png(figure)
 
 
-def probability(effect: EffectFinding) -> float:
-    """Posterior probability of an effect; NaN where it was in no fitted set."""
-    return effect.evidence.get("posterior_probability", float("nan"))
-
-
 def ranked(effects: Sequence[EffectFinding]) -> list[EffectFinding]:
     """The added effects first, then by posterior probability; those that were in no fitted set last."""
-    return sorted(effects, key=lambda effect: (not effect.added, -float(np.nan_to_num(probability(effect), nan=-1.0))))
+    return sorted(effects, key=lambda effect: (not effect.added, -float(np.nan_to_num(effect.probability, nan=-1.0))))
 
 
 def residual_by_phase(findings: Findings, upright: bool = False) -> bytes | None:

@@ -84,3 +84,24 @@ def test_the_text_agrees_with_the_headline() -> None:
 def test_another_verdict_has_its_own_headline_whatever_the_held_out_runs_say() -> None:
     assert headline(_unconfirmed(Verdict.PARTLY_EXPLAINED)) == ("Part of the missing physics is found", "fair")
     assert "held_out_runs" not in findings_to_json(_unconfirmed(Verdict.PARTLY_EXPLAINED))
+
+
+def test_an_effect_that_is_less_likely_than_not_is_said_to_be_with_what_may_be_in_its_place() -> None:
+    findings = made_findings()
+
+    def said(own: float, *others: float) -> str:
+        added, left = findings.added[0], [one for one in findings.effects if not one.added]
+        given = [dataclasses.replace(added, evidence={**added.evidence, "posterior_probability": own})]
+        for k, value in enumerate(others):
+            one = dataclasses.replace(left[0], title=f"other {k}")
+            given.append(dataclasses.replace(one, evidence={**one.evidence, "posterior_probability": value}))
+        return " ".join(narrate(dataclasses.replace(findings, effects=tuple(given))).summary)
+
+    mind = "Mind: latent heat of transformation (posterior probability 0.40) is less likely than not"
+    beside = (
+        ": in its place other 1 (posterior probability 0.32) and other 0 (posterior probability 0.20) may be there."
+    )
+    assert mind + beside in said(0.4, 0.2, 0.32, 0.01)
+    assert f"{mind}." in said(0.4, 0.01)
+    assert "less likely than not" not in said(0.6, 0.3)
+    assert "less likely than not" not in said(float("nan"), 0.3)

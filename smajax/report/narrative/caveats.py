@@ -23,6 +23,7 @@ from smajax.core.display_units import digits, label
 from smajax.core.wording import and_listed
 from smajax.model.effects.library import LIBRARY
 from smajax.report.identifiability_words import remark_text
+from smajax.report.narrative.uncertain_effects import uncertain_effects
 from smajax.report.narrative.values import assumed_text, error_text, far_text, value_text
 
 NAMED_SIZES = 4  # in a sentence
@@ -30,7 +31,6 @@ UNLIKE = 2.0  # by which the noises that outputs leave differ and are more than 
 NORMAL_95 = 1.96
 UNUSUAL = 5.0  # widths of its prior that an effect is off
 LEAST_SEPARATION = 1.0  # noises by which a run has to separate two models to be worth doing
-EVEN = 0.5  # of a probability: as likely as not
 
 
 def of_an_outlier(findings: Findings) -> list[str]:
@@ -148,10 +148,10 @@ def zero_so_far(findings: Findings) -> list[EffectFinding]:
     """
     if not findings.remaining:
         return []
-    off = {one.name for one in findings.after if one.at_zero}
+    off, unlikely = {one.name for one in findings.after if one.at_zero}, uncertain_effects(findings)
 
     def none_of_it(effect: EffectFinding) -> bool:
-        if effect.evidence.get("posterior_probability", np.nan) < EVEN:
+        if effect in unlikely:
             return True
         sizes = {
             name: one for name, one in effect.coefficients.items() if name in LIBRARY[effect.name].candidate.switches

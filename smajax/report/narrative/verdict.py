@@ -26,6 +26,7 @@ from smajax.report.narrative import caveats
 from smajax.report.narrative.curve import curve_sentences
 from smajax.report.narrative.record_errors import of_wrong_records
 from smajax.report.narrative.rounds import reason_text
+from smajax.report.narrative.uncertain_effects import of_uncertain_effects
 from smajax.report.narrative.unknown import unknown_sentences
 from smajax.report.narrative.values import error_text, value_text
 from smajax.report.range_words import range_sentences
@@ -120,6 +121,8 @@ def summary(findings: Findings) -> tuple[str, ...]:
     sentences += caveats.of_priors_left(findings)
     if not _stand_in(findings):  # which are no names at all
         sentences += caveats.of_what_priors_alone_tell(findings)
+        if not findings.remaining:  # `of_zeros_so_far` has them
+            sentences += of_uncertain_effects(findings)
     unnamed = caveats.zero_so_far(findings)
     for effect in findings.added:
         if effect in unnamed or _stand_in(findings):
