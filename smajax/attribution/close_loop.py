@@ -40,21 +40,17 @@ from smajax.attribution.record_fits import MOST_LEFT
 from smajax.attribution.same_as_parameters import said_by_parameters
 from smajax.attribution.step_size_check import finer_integration
 from smajax.attribution.unknown.search import in_place_of
-from smajax.core.beside import begun
 from smajax.core.blas_threads import on_one_blas_thread
 from smajax.core.progress import Progress, Result, Stage, as_progress, quiet, report_warnings
 from smajax.core.provenance import made_with
 from smajax.core.result_cache import ResultCache
 from smajax.data.experiment.record import Experiment
-from smajax.fit.experiment_problem import free_by_name
 from smajax.fit.identifiability import Checks, TakenAt, identifiability
-from smajax.fit.levenberg_marquardt import compile_algebra
 from smajax.fit.preset_priors import visible
 from smajax.fit.sensitivity import sensitivity
 from smajax.simulation.steppers import Integration
 
 SEED = 2004
-COEFFICIENTS = 2  # of the effects that are fitted first, at the least
 MOST_SEARCHES = 2  # the first, and again without what the held-out runs rejected
 MOST_RECORD_ERRORS = 2  # of single runs that are corrected: with more of them nothing is left that says which is right
 EVERY, RARELY = 60.0, 8.0  # s before the first page of a search that goes on; times what the last took before the next
@@ -121,8 +117,6 @@ def prepared(  # the stage's inputs, each once
     records: CorrectedRecords = NO_RECORDS,
 ) -> Context:
     """The experiment as a problem, its base model fitted, and what its runs determine, from the Jacobian there."""
-    fit_runs = [run for run in experiment.runs if run.role == "fit"]
-    begun(compile_algebra, len(free_by_name(experiment, fit_runs)))  # while Python traces the first programs
     job = job_of(experiment, integration)
     start = job.problem.start_values()
     setting = Search(
@@ -151,7 +145,6 @@ def prepared(  # the stage's inputs, each once
     at_fit = sensitivity(problem, base.values[np.asarray(index)], [*job.unknowns, *job.presets])
     values = dict(zip(job.problem.names, base.values.tolist(), strict=True))
     setting.presets = visible(at_fit, values, job.presets)
-    begun(compile_algebra, len(job.unknowns) + len(setting.presets) + COEFFICIENTS)
     identifiable = identifiability(at_fit, job.unknowns, job.bounds, TakenAt.BASE_FIT)
     joint = setting.joint(setting.candidates)
     checks = Checks(

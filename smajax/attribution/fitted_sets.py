@@ -35,6 +35,7 @@ class JointSearch:
     traced: tuple[tuple[str, ...], ...] = ()  # and each of the linear models so far
     winner: tuple[str, ...] = ()  # effects of the likeliest model when the search had ended
     rounds_before: int = 0  # of an earlier search, from whose models this one begins
+    asked_for_one: bool = False  # whether one effect was sought in the place of the many of a model
     thorough: bool = True  # ends only where no effect of the likeliest model can be removed or replaced
     on_round: Callable[[JointRound], None] = lambda _: None
     # What the search goes on from in the place of a model of many effects, itself where nothing is to be sought beside it; None: as it is.

@@ -70,7 +70,7 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
     widened: set[tuple[str, ...]] = set()  # models beside which several effects at once were tried
     shapes: set[tuple[str, ...]] = set()  # effects of groups of these, and of what was searched around in their place
     for number in range(MOST_ROUNDS):
-        present = fit_continued(search, present, error, _stage(search, number) if number else BEGINS)
+        present = fit_continued(search, present, error, stage_of(search, number) if number else BEGINS)
         error = search.error(present)
         if search.needs_presets(present) or (len(present.effects) >= MANY and search.has_wrong_record(present)):
             break
@@ -85,7 +85,7 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
         last = present.effects in checked
         asked = _asked(search, present, error, _neighbours if last else _promising)
         if asked.begun:
-            fit_side_by_side(search, asked.begun, error, _stage(search, number))
+            fit_side_by_side(search, asked.begun, error, stage_of(search, number))
         best, before = search.best(error), present.log_evidence(error**2)
         gain = best.log_evidence(error**2) - before
         if best.effects in left - {present.effects} and gain < SETTLED_ODDS:
@@ -263,7 +263,7 @@ def _several_at_once(
     if not sets:
         return None
     begun = _begun(search, list(sets.values())[:AT_ONCE], linear, traces, level)
-    fit_side_by_side(search, begun, level, _stage(search, number))
+    fit_side_by_side(search, begun, level, stage_of(search, number))
     fitted = [search.fitted[effects] for effects in sets if effects in search.fitted]
     better = [one for one in fitted if one.rms < UNEXPLAINED * search.noise and search.error(one) < error]
     best = max(better, key=lambda one: _gain(search, present, one), default=None)
@@ -327,7 +327,7 @@ def _fit_alone(
         return [frozenset({one}) for effect, one in places.items() if effect in shown][:most]
 
     begun = _asked(search, search.fitted[()], error, alone, shown, most).begun
-    fit_side_by_side(search, begun, error, _stage(search, len(search.rounds)), compared, least_cost)
+    fit_side_by_side(search, begun, error, stage_of(search, len(search.rounds)), compared, least_cost)
 
 
 def _asked(
@@ -357,7 +357,7 @@ def _asked(
     return asked
 
 
-def _stage(search: JointSearch, number: int) -> str:
+def stage_of(search: JointSearch, number: int) -> str:
     now = search.rounds_before + number + 1
     return f"round {now} ({USUAL_ROUNDS if now <= MANY_ROUNDS else LATE}): fitting the likeliest sets of effects"
 

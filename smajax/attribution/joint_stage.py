@@ -17,15 +17,10 @@ from smajax.attribution.findings import Round
 from smajax.attribution.fitted_sets import JointRound, JointSearch
 from smajax.attribution.freed_presets import freed_at_the_base, freed_by_a_step, nearer_base, needs_presets
 from smajax.attribution.input_of_run import FAR_LESS
-from smajax.attribution.joint_search import (
-    MANY,
-    described_alone,
-    fitted_alone,
-    likeliest_alone,
-    search_jointly,
-)
+from smajax.attribution.joint_search import MANY, described_alone, fitted_alone, likeliest_alone, search_jointly
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model
 from smajax.attribution.model_fits import Evidence, Model, Search
+from smajax.attribution.nearest_alone import nearest_alone
 from smajax.attribution.optimum import (
     as_model,
     final_model,
@@ -136,11 +131,14 @@ class _Stage:
     def in_place_of_many(self, search: JointSearch, found: FittedModel) -> FittedModel | None:
         """`found` itself where it has many effects that leave more than noise, and an unknown function in the base model that is named leaves only noise and is likelier.
 
-        The effects then stand in for it, and every one that is added has less to go by. One effect of the function's equation that is
-        likelier than they are comes first.
+        The effects then stand in for it, and every one that is added has less to go by. One effect that is likelier than they are comes first.
         """
         if len(found.effects) < MANY or leaves_noise(self.setting, found):
             return None
+        if not search.asked_for_one:
+            search.asked_for_one = True
+            if (one := self._one_of_all(search, found)) is not None:
+                return one
         asked = self._asked(search, found)
         if asked.fits is None or not self._likelier(search, found, asked.fits.fitted[:1]):
             return None
@@ -201,7 +199,8 @@ class _Stage:
         every = [name for name in search.joint.coefficients if name not in search.excluded]
         # First those that are fitted to their end: the others are not fitted again at this error.
         described = [] if leaves_noise(self.setting, found) else described_alone(search, found)
-        likelier = self._likelier(search, found, [*described, *likeliest_alone(search, every, found)])
+        alone = nearest_alone(search, likeliest_alone(search, every, found), found)
+        likelier = self._likelier(search, found, [*described, *alone])
         return likelier[0] if likelier else None
 
     def _asked(self, search: JointSearch, found: FittedModel) -> AskedFor:

@@ -29,7 +29,9 @@ def _as_float_array(value: Any) -> Any:
 
 def by_numpy(values: Any) -> Any:
     """An array of JAX whose values are known as numpy's, anything else as it is: of JAX each index into another shape is a program to compile."""
-    return np.asarray(values) if isinstance(values, jax.Array) and not isinstance(values, jax.core.Tracer) else values
+    if not isinstance(values, jax.Array) or isinstance(values, jax.core.Tracer) or values.committed:
+        return values  # what lies on a device by request stays there
+    return np.asarray(values)
 
 
 def parameter(

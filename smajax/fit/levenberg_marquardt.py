@@ -4,8 +4,14 @@
 of many fits at once, and a run can be interrupted and resumed; so this driver holds the state of every fit, and each
 round calls search and descent (`bounded_descent`) on the normal equations, as `optimistix.AbstractGaussNewton.step` does.
 
-Measured against the same method in numpy with scipy's `lsq_linear` within bounds (optimistix 0.1.0, two cores, three problems, the bench with 15
-free parameters the largest): evaluations 219, 192, 566 and before 219, 192, 562; least costs alike to 7e-10; algebra 0.34, 0.29, 1.56 s and before 0.25, 0.24, 1.20 s.
+Measured against the same method in numpy with scipy's `lsq_linear` within bounds (optimistix 0.1.0, two cores, processor
+time of a whole `identify` with compiled programs at hand):
+
+| problem | evaluations | least cost, relative | algebra | identify |
+|---|---|---|---|---|
+| demo, latent heat | 219, before 219 | 4e-14 off | 0.34 s, before 0.25 s | 1.46 s, before 1.38 s |
+| demo, complete model | 192, before 192 | 7e-15 off | 0.29 s, before 0.24 s | 1.26 s, before 1.30 s |
+| bias-spring bench, 15 free | 566, before 562 | 7e-10 off | 1.56 s, before 1.20 s | 12.7 s, before 11.8 s |
 
 Unless the step before kept what it promised, or the derivatives of all fits take few runs, a round first asks what the step's cost is: one run, where derivatives take one for every two or four free parameters. It
 shortens the step until the cost is lower. So a fit may begin with nearly the whole step of Gauss and Newton. On 27 fits of nine problems (bench, demo, a dead weight with friction) a cost within 1 of
@@ -117,17 +123,13 @@ class LMState(eqx.Module):
     status: Int[Array, ""]
 
 
-def _padded(free: int) -> int:
-    return -(-max(free, 1) // PADDING) * PADDING
-
-
-def _initial_state(guess: np.ndarray, size: int) -> LMState:
+def _initial_state(task: FitTask, size: int) -> LMState:
     y = np.full(size, 0.5)
-    y[: len(guess)] = guess
+    y[: len(task.slots)] = task.initial_guess
     zero = np.zeros(size)
     descent = DescentState(y, zero, np.zeros((size, size)), zero)
     search = SearchState(*(np.asarray(value) for value in (SEARCH.initial_damping, 2.0, 0.0, 0.0)))
-    status = Status.RUNNING if len(guess) else Status.NOTHING_FREE
+    status = Status.RUNNING if len(task.slots) else Status.NOTHING_FREE
     return LMState(y, y, np.asarray(np.inf), descent, search, np.asarray(-1), np.asarray(int(status)))
 
 
@@ -186,12 +188,6 @@ def _advanced(state: LMState, equations: NormalEquations, tolerances: tuple[floa
     padded, square = np.zeros(size), np.zeros((size, size))
     padded[:free], square[:free, :free] = gradient, hessian
     return jax.device_get(_advance(state, np.asarray(0.5 * cost), padded, square, tolerances))
-
-
-def compile_algebra(free: int) -> None:
-    """Compile what fits of so many free parameters take besides their runs."""
-    state = _initial_state(np.full(free, 0.5), _padded(free))
-    _advanced(state, (1.0, np.zeros(free), np.eye(free)), (TOLERANCE, 0.0))
 
 
 def _packed(states: Sequence[LMState], rounds: int) -> dict[str, np.ndarray]:
@@ -302,10 +298,9 @@ def levenberg_marquardt(
     settings = settings or FitSettings()
     cache, progress = settings.cache, settings.progress
     directions = max([len(task.slots) for task in tasks], default=1)
-    size = _padded(directions)
+    size = -(-max(directions, 1) // PADDING) * PADDING
     tolerances = settings.tolerance, 0.5 * settings.absolute_tolerance
-    states = [_initial_state(task.initial_guess, size) for task in tasks]
-    fits = _Fits(problem, tasks, outputs, tolerances, directions, states)
+    fits = _Fits(problem, tasks, outputs, tolerances, directions, [_initial_state(task, size) for task in tasks])
     limits = settings.allowed_excess, settings.least_cost, settings.promised_excess, settings.one_of_each
     settled = settings.max_steps, settings.tolerance, settings.absolute_tolerance, *limits
     measured = outputs if outputs is not None else ""

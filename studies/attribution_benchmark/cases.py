@@ -142,7 +142,7 @@ def true_wire(case: Case) -> Wire:
 
 
 def truth(case: Case) -> Truth:
-    """Wire and coefficients of a case; takes some seconds per effect on a rig with a load."""
+    """Wire and coefficients of a case; takes minutes per effect on a rig with a load."""
     rig, wire = RIGS[case.rig], true_wire(case)
     if not case.effects:
         return Truth(case.rig, wire, {}, {}, 0.0)
@@ -153,5 +153,5 @@ def truth(case: Case) -> Truth:
     found = {name: ruler.find(name, case.strength) for name in case.effects}
     effects = {name: f.coefficient for name, f in found.items()}
     alone = len(found) == 1
-    together = next(iter(found.values())).strength if alone else ruler.strength(effects)
+    together = next(iter(found.values())).strength if alone else ruler.together(effects)
     return Truth(case.rig, wire, effects, found, together)

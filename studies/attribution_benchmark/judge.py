@@ -62,12 +62,17 @@ class Judged:
     held_out_before: float
     held_out_after: float
     seconds: float
-    weakest: float | None = None  # strength of the weakest of its effects, each alone; None: not written down
+    weakest: float = float("nan")  # strength of the weakest of its effects, each alone; NaN: not written down
 
     @property
     def full(self) -> bool:
-        """Whether each of several effects has the strength that was asked for: a physical limit may lie below."""
-        return (self.strength if self.weakest is None else self.weakest) >= REACHED * self.asked
+        """Whether each of several effects has the strength that was asked for: a physical limit may lie below. Not where it is not known."""
+        return self.weakest >= REACHED * self.asked
+
+    @property
+    def short(self) -> bool:
+        """Whether one is known to have less."""
+        return self.weakest < REACHED * self.asked
 
     @property
     def several(self) -> bool:

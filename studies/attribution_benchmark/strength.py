@@ -27,12 +27,13 @@ TRIALS = 8
 CLOSER = 0.7  # in logarithms, towards what can be simulated
 DEGREES = 0.1  # steps of the derivatives: of a temperature, K
 SHARE = 2e-3  # of all else
-STEPS = 12  # tried with one set of derivatives, at most
-RENEWED = 3  # times that the derivatives are taken anew where the refit has come to, at most
+STEPS = 6  # tried with one set of derivatives, at most
+RENEWED = 10  # times that the derivatives are taken anew where the refit has come to, at most
 NOTHING = 0.05  # noises: a rest that counts as none
-IDLE = 3  # steps that gain next to nothing, one after the other, end a refit
+IDLE = 3  # steps that gain next to nothing, one after the other, end it
+REJECTED, ACCEPTED = 5.0, 0.2  # times the damping after a step
 ENOUGH = 0.8  # of the strength asked for: what leaves less is not refitted further, for it is too little
-GAINED = 0.97  # a step that leaves more of the rest than this share gains next to nothing
+GAINED = 0.99  # a step that leaves more of the rest than this share gains next to nothing
 ABSURD = 10.0  # times the rest: of a step that leaves so much nothing is learnt
 FIRST_DAMPING = 1e-3  # of the derivatives' squares, each in its own size
 # Of a simulation: ranges meet or vanish, or the modes chatter.
@@ -41,7 +42,7 @@ NO_SUCH_WIRE = (ValueError, RuntimeError, ZeroDivisionError, OverflowError)
 
 @dataclass(frozen=True)
 class Found:
-    """Coefficient, the strength it has, and whether the largest physical coefficient stopped the search."""
+    """Coefficient, the strength it has, and whether the largest coefficient that is physical, or can be simulated, ended the search."""
 
     coefficient: float
     strength: float
@@ -50,11 +51,12 @@ class Found:
 
 @dataclass(frozen=True)
 class Refit:
-    """The wire that a refit came to, the derivatives there, and the root mean square of what it leaves, in noises."""
+    """The wire that a refit came to, the derivatives it used last, what it leaves as a root mean square in noises, and half of what it made least."""
 
     wire: Wire
     slopes: Matrix
     left: float
+    objective: float
 
 
 class Ruler:
@@ -68,6 +70,7 @@ class Ruler:
         self.runs = [run for run in rig.runs(wire) if run.role == "fit"]
         self.null = self.readings(wire, {})
         self.slopes = self._slopes(wire, self.null)
+        self.found: dict[str, Refit] = {}  # of each effect whose coefficient was sought
 
     def readings(self, wire: Wire, effects: Effects) -> Vector:
         """Noise-free readings of all fit runs, in noises."""
@@ -93,7 +96,7 @@ class Ruler:
         by_run = readings.reshape(len(self.runs), -1)
         return (by_run - by_run.mean(axis=1, keepdims=True)).ravel()
 
-    def _rests(self, shown: Vector, wire: Wire) -> Vector:
+    def rests(self, shown: Vector, wire: Wire) -> Vector:
         """What a wire leaves of the readings, and how far its values of the sheet are from the true ones, in widths."""
         off = [(getattr(self.wire, name) - getattr(wire, name)) / one for name, one in self.spread.items()]
         return np.concatenate([self._centred(shown - self.readings(wire, {})), off])
@@ -105,28 +108,47 @@ class Ruler:
         """Root mean square of what a refit leaves of the effects, in noises."""
         return self.refit(effects).left
 
+    def together(self, effects: Effects) -> float:
+        """The same of effects that were sought each alone: from the true wire, and from where their own refits come to together."""
+        own = [self.found[name].wire for name in effects]
+        values = {
+            name: getattr(self.wire, name) + sum(getattr(one, name) - getattr(self.wire, name) for one in own)
+            for name in self.names
+        }
+        refits = [self.refit(effects)]
+        begin = replace(refits[0], wire=replace(self.wire, **values))
+        try:
+            if _possible(begin.wire):
+                refits.append(self.refit(effects, begin))
+        except NO_SUCH_WIRE:
+            pass
+        return min(refits, key=lambda one: one.objective).left
+
     def refit(self, effects: Effects, begin: Refit | None = None, below: float = NOTHING) -> Refit:
         """The base model fitted to the readings with the effects, from the true wire or another; ended early where less than `below` is left."""
         shown = self.readings(self.wire, effects)
         wire, slopes = (self.wire, self.slopes) if begin is None else (begin.wire, begin.slopes)
-        rests = self._rests(shown, wire)
+        rests, damping = self.rests(shown, wire), FIRST_DAMPING
+        of_here = begin is None  # whether the derivatives are those of the wire
         for renewed in range(RENEWED + 1):
-            before = self._left(rests)
-            wire, rests = self._refitted(shown, wire, rests, slopes, below)
-            left = self._left(rests)
-            if renewed == RENEWED or left < below or (renewed and left > GAINED * before):
+            before = float(rests @ rests)
+            wire, rests, damping = self._refitted(shown, wire, rests, slopes, damping, below)
+            gained = float(rests @ rests) < GAINED**2 * before
+            if renewed == RENEWED or self._left(rests) < below or (of_here and not gained):
                 break
             try:
-                slopes = self._slopes(wire, self.readings(wire, {}))
+                slopes, of_here = self._slopes(wire, self.readings(wire, {})), True
             except NO_SUCH_WIRE:
                 break
-        return Refit(wire, slopes, self._left(rests))
+        return Refit(wire, slopes, self._left(rests), 0.5 * float(rests @ rests))
 
-    def _refitted(self, shown: Vector, wire: Wire, rests: Vector, slopes: Matrix, below: float) -> tuple[Wire, Vector]:
-        """Where the steps from a wire come to, and its rests; after each the derivatives are corrected by what it did (Broyden)."""
+    def _refitted(  # of a refit all that it has
+        self, shown: Vector, wire: Wire, rests: Vector, slopes: Matrix, damping: float, below: float
+    ) -> tuple[Wire, Vector, float]:
+        """Where the steps from a wire come to, its rests, and the damping; after each step the derivatives are corrected by what it did (Broyden)."""
         sizes = np.linalg.norm(slopes, axis=0)
         matrix = slopes / sizes
-        damping, idle = FIRST_DAMPING, 0
+        idle = 0
         for _ in range(STEPS):
             normal = matrix.T @ matrix
             move = np.linalg.solve(normal + damping * np.eye(len(normal)), matrix.T @ rests)
@@ -135,21 +157,22 @@ class Ruler:
             try:
                 if not _possible(there):
                     raise ValueError("no such wire")
-                new = self._rests(shown, there)
+                new = self.rests(shown, there)
                 if not self._left(new) < ABSURD * self._left(rests):
                     raise ValueError("no derivatives hold so far")
             except NO_SUCH_WIRE:
-                damping *= 10.0
+                damping *= REJECTED
                 continue
             matrix = matrix + np.outer(rests - new - matrix @ move, move) / float(move @ move)
-            better = float(new @ new) < float(rests @ rests)
-            idle = 0 if self._left(new) < GAINED * self._left(rests) else idle + 1
-            damping *= 0.2 if better else 5.0
-            if better:
-                wire, rests = there, new
-            if self._left(rests) < below or idle >= IDLE:
+            least = float(rests @ rests)
+            if float(new @ new) >= least:
+                damping *= REJECTED
+                continue
+            idle = idle + 1 if float(new @ new) > GAINED**2 * least else 0
+            wire, rests, damping = there, new, ACCEPTED * damping
+            if self._left(rests) < below or idle == IDLE:
                 break
-        return wire, rests
+        return wire, rests, damping
 
     def find(self, name: str, wanted: float, others: Mapping[str, float] | None = None) -> Found:
         """Coefficient of an effect at which its strength, beside `others`, is `wanted`; secant in logarithms."""
@@ -159,34 +182,42 @@ class Ruler:
         def effects_of(size: float) -> Effects:
             return {**others, name: sign * math.exp(size)}
 
-        trials: list[tuple[float, float]] = []
         refits: dict[float, Refit] = {}
         size, begin = min(math.log(abs(effect.first)), largest), None
         for _ in range(TRIALS):
             try:
-                refit = self.refit(effects_of(size), begin, ENOUGH * wanted)
+                refits[size] = self._best(effects_of(size), begin, wanted)
             except NO_SUCH_WIRE:
                 largest = size - CLOSER
-                size = largest
+                size, begin = largest, None
                 continue
-            trials.append((size, math.log(max(refit.left, 1e-9) / wanted)))
-            refits[size] = refit
-            best = min(trials, key=lambda trial: abs(trial[1]))
-            if abs(best[1]) < TOLERANCE or (size == largest and trials[-1][1] < 0):
+            missed = _missed(refits[size], wanted)
+            if abs(missed) < TOLERANCE or (size == largest and missed < 0):
                 break
+            trials = [(one, _missed(refit, wanted)) for one, refit in refits.items()]
             following = min(_next(trials), largest)
-            begin, size = self._moved(refit, math.exp(following - size)), following
-        if not trials:
+            begin, size = self._moved(refits[size], math.exp(following - size)), following
+        if not refits:
             raise ValueError(
                 f"{name} at {effect.first:g} cannot be simulated on {self.rig.name}; expected a smaller first"
             )
-        size, missed = min(trials, key=lambda trial: abs(trial[1]))
-        if abs(missed) >= TOLERANCE and all(one < 0 for _, one in trials):
-            size = max(refits)  # capped
+        size = min(refits, key=lambda one: abs(_missed(refits[one], wanted)))
+        capped = all(_missed(refit, wanted) <= -TOLERANCE for refit in refits.values()) and largest in refits
+        if capped:
+            size = largest
         refit = refits[size]
         if refit.left < ENOUGH * wanted:  # not refitted to the end
             refit = self.refit(effects_of(size), refit)
-        return Found(sign * math.exp(size), refit.left, refit.left < math.exp(-TOLERANCE) * wanted)
+        self.found[name] = refit
+        return Found(sign * math.exp(size), refit.left, capped)
+
+    def _best(self, effects: Effects, begin: Refit | None, wanted: float) -> Refit:
+        """The better refit of those from about where another came to and from the true wire; one alone where it leaves too little."""
+        below = ENOUGH * wanted
+        first = self.refit(effects, begin, below)
+        if begin is None or first.left < below:
+            return first
+        return min(first, self.refit(effects, None, below), key=lambda one: one.objective)
 
     def _moved(self, refit: Refit, share: float) -> Refit | None:
         """About where a refit to effects of this share of the size comes to; None: no such wire."""
@@ -206,6 +237,11 @@ def _possible(wire: Wire) -> bool:
     rates = wire.convection_coefficient, wire.specific_heat, wire.recoverable_strain, wire.stress_slope_austenite
     apart = wire.austenite_finish > wire.martensite_start and wire.austenite_start > wire.martensite_finish
     return min(*ranges, *rates) > 0 and apart
+
+
+def _missed(refit: Refit, wanted: float) -> float:
+    """In logarithms."""
+    return math.log(max(refit.left, 1e-9) / wanted)
 
 
 def _next(trials: list[tuple[float, float]]) -> float:

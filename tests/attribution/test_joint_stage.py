@@ -133,6 +133,7 @@ def _stage_and_search(
 
     monkeypatch.setattr(joint_stage, "fitted_alone", fitted_alone)
     monkeypatch.setattr(joint_stage, "likeliest_alone", likeliest_alone)
+    monkeypatch.setattr(joint_stage, "nearest_alone", lambda search, alone, found: alone)
     search = SimpleNamespace(
         fitted={(): _model((), 9.0, 0.0)},
         error=lambda model: float(model.residual[0]),
@@ -140,6 +141,7 @@ def _stage_and_search(
         wrong_record=None,
         noise=1.0,
         thorough=True,
+        asked_for_one=True,
         joint=SimpleNamespace(coefficients=("latent_heat", "sensor_drift", "sensor_gain")),
         excluded=frozenset({"sensor_gain"}),
     )

@@ -69,7 +69,7 @@ def _task(start: np.ndarray) -> FitTask:
 
 
 def _fitted(columns: np.ndarray, target: np.ndarray, start: np.ndarray) -> LMState:
-    state = _initial_state(_task(start).initial_guess, 8)
+    state = _initial_state(_task(start), 8)
     while state.status == Status.RUNNING and state.steps < MAX_STEPS:
         residual = columns @ np.asarray(state.y_eval)[: len(start)] - target
         equations = float(residual @ residual), columns.T @ residual, columns.T @ columns
@@ -127,7 +127,7 @@ ONE = _task(np.full(1, 0.5))
 
 
 def test_a_fit_ends_where_its_cost_falls_by_less_than_the_absolute_tolerance() -> None:
-    state = _initial_state(ONE.initial_guess, 8)
+    state = _initial_state(ONE, 8)
     falling = [(1.0, np.ones(1)), (0.9, np.ones(1)), (0.8999, np.full(1, 1e-3))]
     ended = []
     for cost, gradient in falling:
@@ -137,10 +137,7 @@ def test_a_fit_ends_where_its_cost_falls_by_less_than_the_absolute_tolerance() -
 
 
 def test_fits_far_above_the_best_end_after_as_many_steps_as_allowed() -> None:
-    near, far = (
-        _advanced(_initial_state(ONE.initial_guess, 8), (cost, np.ones(1), np.eye(1)), TOLERANCES)
-        for cost in (10.0, 200.0)
-    )
+    near, far = (_advanced(_initial_state(ONE, 8), (cost, np.ones(1), np.eye(1)), TOLERANCES) for cost in (10.0, 200.0))
     allowed = FitSettings(allowed_excess=((3, 400.0), (6, 100.0)))
     for steps, expected in ((2, Status.RUNNING), (3, Status.RUNNING), (6, Status.EXCEEDED)):
         states = _without_exceeding([ONE, ONE], [near, far], steps, allowed)
@@ -152,7 +149,7 @@ def test_fits_far_above_the_best_end_after_as_many_steps_as_allowed() -> None:
 
 def test_a_fit_ends_that_promises_to_stay_far_above_the_best() -> None:
     """By the least value of its quadratic model: cost 200 with a column that takes off 10, or 190, of it."""
-    best = _advanced(_initial_state(ONE.initial_guess, 8), (10.0, np.zeros(1), np.eye(1)), TOLERANCES)
+    best = _advanced(_initial_state(ONE, 8), (10.0, np.zeros(1), np.eye(1)), TOLERANCES)
     settings = FitSettings(promised_excess=(4, 50.0))
     for decrease, steps, expected in (
         (10.0, 4, Status.EXCEEDED),
@@ -161,7 +158,7 @@ def test_a_fit_ends_that_promises_to_stay_far_above_the_best() -> None:
     ):
         # The minimum of f = r^T r / 2 lies 0.1 away, within the bounds, and is lower by decrease / 2.
         gradient, hessian = np.array([decrease / 0.1]), np.array([[decrease / 0.1**2]])
-        far = _advanced(_initial_state(ONE.initial_guess, 8), (200.0, gradient, hessian), TOLERANCES)
+        far = _advanced(_initial_state(ONE, 8), (200.0, gradient, hessian), TOLERANCES)
         assert [int(one.status) for one in _without_exceeding([ONE, ONE], [best, far], steps, settings)] == [
             Status.RUNNING,
             expected,
@@ -171,7 +168,7 @@ def test_a_fit_ends_that_promises_to_stay_far_above_the_best() -> None:
 def test_a_fit_ends_that_promises_to_stay_above_its_goal() -> None:
     """Cost 200 that falls by 60 to the least value of its quadratic model: to a goal of 85 it may come by twice that, to 70 not."""
     gradient, hessian = np.array([600.0]), np.array([[6000.0]])
-    state = _advanced(_initial_state(ONE.initial_guess, 8), (200.0, gradient, hessian), TOLERANCES)
+    state = _advanced(_initial_state(ONE, 8), (200.0, gradient, hessian), TOLERANCES)
     for goal, steps, expected in (
         (85.0, GOAL_STEPS, Status.RUNNING),
         (70.0, GOAL_STEPS, Status.EXCEEDED),
@@ -186,9 +183,7 @@ def test_of_fits_that_free_the_same_the_best_alone_goes_on() -> None:
     one, other = _task(np.full(1, 0.5)), _task(np.full(2, 0.5))
     tasks, costs = [one, one, other], [3.0, 2.0, 9.0]
     states = [
-        _advanced(
-            _initial_state(task.initial_guess, 8), (cost, np.ones(len(task.slots)), np.eye(len(task.slots))), TOLERANCES
-        )
+        _advanced(_initial_state(task, 8), (cost, np.ones(len(task.slots)), np.eye(len(task.slots))), TOLERANCES)
         for task, cost in zip(tasks, costs, strict=True)
     ]
     left = [int(state.status) for state in _best_of_each(tasks, states)]
@@ -223,15 +218,13 @@ def test_steps_that_are_rejected_are_no_rounds_whether_costs_or_derivatives_are_
 
 
 def test_a_step_to_a_jacobian_that_is_not_finite_is_rejected() -> None:
-    state = _advanced(_initial_state(_task(np.full(2, 0.5)).initial_guess, 8), (1.0, np.ones(2), np.eye(2)), TOLERANCES)
+    state = _advanced(_initial_state(_task(np.full(2, 0.5)), 8), (1.0, np.ones(2), np.eye(2)), TOLERANCES)
     assert not np.array_equal(state.y_eval, state.y)
     after = _advanced(state, (0.5, np.array([np.nan, 1.0]), np.eye(2)), TOLERANCES)
     np.testing.assert_array_equal(after.y, state.y)
     assert after.status == Status.RUNNING
     lost: NormalEquations = (np.nan, np.ones(2), np.eye(2))
-    assert (
-        _advanced(_initial_state(_task(np.full(2, 0.5)).initial_guess, 8), lost, TOLERANCES).status == Status.NOT_FINITE
-    )
+    assert _advanced(_initial_state(_task(np.full(2, 0.5)), 8), lost, TOLERANCES).status == Status.NOT_FINITE
 
 
 def test_equations_that_are_singular_to_rounding_are_no_error() -> None:

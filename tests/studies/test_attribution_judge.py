@@ -134,6 +134,7 @@ def test_the_benchmarks_tables_and_picture_are_written(tmp_path: Path) -> None:
         told_with_it["all effects of a pair or triple of which one has less than the strength asked for"]
         == "0 of 1 (0 %)"
     )
+    assert told["a case in under two minutes"] == "7 of 8 (88 %)"
     assert told["a case in under three minutes"] == "8 of 8 (100 %)"
     assert strength_of(cases[0]) == 10.0
     # What the generator calls ten noises, and a refit to its end leaves next to nothing of.

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from smajax.core.parameters import parameter_values
 from smajax.data.experiment.load import load_experiment
@@ -16,7 +17,7 @@ from studies.attribution_benchmark.cases import Case, true_wire
 from studies.attribution_benchmark.effects import EFFECTS
 from studies.attribution_benchmark.rigs import RIGS
 from studies.attribution_benchmark.sheet import WIDTHS, drawn_about, on_the_sheet
-from studies.attribution_benchmark.strength import Ruler
+from studies.attribution_benchmark.strength import NO_SUCH_WIRE, Ruler
 from studies.attribution_benchmark.write import experiment_text
 
 
@@ -81,4 +82,26 @@ def test_an_effect_too_weak_by_nature_is_capped_with_the_strength_that_it_has() 
     assert found.capped
     assert found.coefficient == pytest.approx(EFFECTS["thermal_expansion"].largest)
     assert 0.0 < found.strength < 50.0
-    assert found.strength <= 1.1 * ruler.strength({"thermal_expansion": found.coefficient})
+    assert found.strength <= 1.01 * ruler.strength({"thermal_expansion": found.coefficient})
+
+
+@pytest.mark.parametrize("name", ["residual_strain", "transformation_drift", "two_part_transformation"])
+def test_a_strength_is_that_of_scipys_refit(name: str) -> None:
+    """By least squares with derivatives taken anew at every step, from where the values are true."""
+    rig = RIGS["coupon"]
+    ruler = Ruler(rig, rig.wire, on_the_sheet(rig))
+    found = ruler.find(name, 10.0)
+    shown = ruler.readings(rig.wire, {name: found.coefficient})
+    true = np.asarray([getattr(rig.wire, one) for one in ruler.names])
+    sizes = np.where([one.endswith(("start", "finish")) for one in ruler.names], 1.0, 0.05 * true)
+
+    def rests(moved: np.ndarray) -> np.ndarray:
+        values = dict(zip(ruler.names, (true + moved * sizes).tolist(), strict=True))
+        try:
+            return ruler.rests(shown, replace(rig.wire, **values))
+        except NO_SUCH_WIRE:
+            return np.full(ruler.null.size + len(ruler.spread), 1e3)
+
+    refit = least_squares(rests, np.zeros(len(true)), diff_step=1e-4, max_nfev=60)
+    left = np.sqrt(np.mean(refit.fun[: ruler.null.size] ** 2))
+    assert found.strength == pytest.approx(left, rel=0.1)
