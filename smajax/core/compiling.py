@@ -16,34 +16,52 @@ PATIENCE = 2.0  # s; what takes less is a small program, or one from the cache
 
 
 class _Watch:
-    """A timer beside each compilation, which reports one that takes longer than `PATIENCE`."""
+    """A timer beside the compilation of each thread, which reports one that takes longer than `PATIENCE`."""
 
     def __init__(self) -> None:
         self.progress: Progress | None = None
-        self.timer: threading.Timer | None = None
-        self.native = False  # a program of `smajax.engine`, in which JAX may compile small ones of its own
+        self.native: set[int] = (
+            set()
+        )  # threads with a program of `smajax.engine`, in which JAX may compile small ones of its own
+        self._timers: dict[int, threading.Timer] = {}
+        self._lock = threading.Lock()
 
     def on_event(self, event: str, **_: str | int) -> None:
         if event == REQUESTED:
             self.start()
 
     def on_duration(self, event: str, duration_secs: float, **_: str | int) -> None:
-        if event == COMPILED and not self.native:
+        if event == COMPILED and threading.get_ident() not in self.native:
             self.stop()
 
     def start(self) -> None:
-        if self.progress is None or self.timer is not None:
-            return
-        self.timer = threading.Timer(PATIENCE, self.progress, (Compiling(True),))
-        self.timer.daemon = True
-        self.timer.start()
+        own = threading.get_ident()
+        with self._lock:
+            if self.progress is None or own in self._timers:
+                return
+            timer = self._timers[own] = threading.Timer(PATIENCE, self.progress, (Compiling(True),))
+            timer.daemon = True
+            timer.start()
 
     def stop(self) -> None:
-        if self.timer is not None:
-            self.timer.cancel()
-            self.timer = None
-            if self.progress is not None:
-                self.progress(Compiling(False))
+        with self._lock:
+            timer = self._timers.pop(threading.get_ident(), None)
+            another = bool(self._timers)
+        if timer is None:
+            return
+        timer.cancel()
+        if self.progress is not None and not another:  # while another thread compiles that is still so
+            self.progress(Compiling(False))
+
+    def stop_all(self) -> None:
+        """Of every thread."""
+        with self._lock:
+            timers = list(self._timers.values())
+            self._timers.clear()
+        for timer in timers:
+            timer.cancel()
+        if timers and self.progress is not None:
+            self.progress(Compiling(False))
 
 
 @lru_cache(maxsize=1)
@@ -62,12 +80,14 @@ def compiling() -> Iterator[None]:
     """A block that traces, translates and compiles a program, which is cached."""
     watch = _watch()
     watch.start()
-    before, watch.native = watch.native, True
+    own = threading.get_ident()
+    within = own in watch.native
+    watch.native.add(own)
     try:
         yield
     finally:
-        watch.native = before
-        if not before:
+        if not within:
+            watch.native.discard(own)
             watch.stop()
 
 
@@ -79,5 +99,5 @@ def compilations_reported(progress: Progress) -> Iterator[None]:
     try:
         yield
     finally:
-        watch.stop()
+        watch.stop_all()
         watch.progress = before
