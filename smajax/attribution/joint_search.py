@@ -358,6 +358,7 @@ def _asked(
 
 
 def stage_of(search: JointSearch, number: int) -> str:
+    """What is said of the fits of a round of a search, its first one 0."""
     now = search.rounds_before + number + 1
     return f"round {now} ({USUAL_ROUNDS if now <= MANY_ROUNDS else LATE}): fitting the likeliest sets of effects"
 

@@ -20,9 +20,8 @@ class _Watch:
 
     def __init__(self) -> None:
         self.progress: Progress | None = None
-        self.native: set[int] = (
-            set()
-        )  # threads with a program of `smajax.engine`, in which JAX may compile small ones of its own
+        # Threads with a program of `smajax.engine`, in which JAX may compile small ones of its own.
+        self.native: set[int] = set()
         self._timers: dict[int, threading.Timer] = {}
         self._lock = threading.Lock()
 
@@ -43,24 +42,15 @@ class _Watch:
             timer.daemon = True
             timer.start()
 
-    def stop(self) -> None:
+    def stop(self, every: bool = False) -> None:
+        """The end of this thread's compilation, or of every thread's."""
         with self._lock:
-            timer = self._timers.pop(threading.get_ident(), None)
+            ended = list(self._timers) if every else [threading.get_ident()]
+            timers = [self._timers.pop(thread) for thread in ended if thread in self._timers]
             another = bool(self._timers)
-        if timer is None:
-            return
-        timer.cancel()
-        if self.progress is not None and not another:  # while another thread compiles that is still so
-            self.progress(Compiling(False))
-
-    def stop_all(self) -> None:
-        """Of every thread."""
-        with self._lock:
-            timers = list(self._timers.values())
-            self._timers.clear()
         for timer in timers:
             timer.cancel()
-        if timers and self.progress is not None:
+        if timers and self.progress is not None and not another:  # while another thread compiles that is still so
             self.progress(Compiling(False))
 
 
@@ -99,5 +89,5 @@ def compilations_reported(progress: Progress) -> Iterator[None]:
     try:
         yield
     finally:
-        watch.stop_all()
+        watch.stop(every=True)
         watch.progress = before

@@ -111,17 +111,13 @@ class Ruler:
     def together(self, effects: Effects) -> float:
         """The same of effects that were sought each alone: from the true wire, and from where their own refits come to together."""
         own = [self.found[name].wire for name in effects]
-        values = {
-            name: getattr(self.wire, name) + sum(getattr(one, name) - getattr(self.wire, name) for one in own)
-            for name in self.names
-        }
         refits = [self.refit(effects)]
-        begin = replace(refits[0], wire=replace(self.wire, **values))
-        try:
-            if _possible(begin.wire):
-                refits.append(self.refit(effects, begin))
-        except NO_SUCH_WIRE:
-            pass
+        begin = self._moved(
+            refits[0],
+            {name: sum(getattr(one, name) - getattr(self.wire, name) for one in own) for name in self.names},
+        )
+        if begin is not None:
+            refits.append(self.refit(effects, begin))
         return min(refits, key=lambda one: one.objective).left
 
     def refit(self, effects: Effects, begin: Refit | None = None, below: float = NOTHING) -> Refit:
@@ -196,7 +192,7 @@ class Ruler:
                 break
             trials = [(one, _missed(refit, wanted)) for one, refit in refits.items()]
             following = min(_next(trials), largest)
-            begin, size = self._moved(refits[size], math.exp(following - size)), following
+            begin, size = self._scaled(refits[size], math.exp(following - size)), following
         if not refits:
             raise ValueError(
                 f"{name} at {effect.first:g} cannot be simulated on {self.rig.name}; expected a smaller first"
@@ -219,11 +215,15 @@ class Ruler:
             return first
         return min(first, self.refit(effects, None, below), key=lambda one: one.objective)
 
-    def _moved(self, refit: Refit, share: float) -> Refit | None:
+    def _scaled(self, refit: Refit, share: float) -> Refit | None:
         """About where a refit to effects of this share of the size comes to; None: no such wire."""
-        values = {name: getattr(self.wire, name) for name in self.names}
-        there = {name: one + share * (getattr(refit.wire, name) - one) for name, one in values.items()}
-        wire = replace(self.wire, **there)
+        return self._moved(
+            refit, {name: share * (getattr(refit.wire, name) - getattr(self.wire, name)) for name in self.names}
+        )
+
+    def _moved(self, refit: Refit, moves: Mapping[str, float]) -> Refit | None:
+        """`refit` at the true wire with its values moved by so much; None: no such wire."""
+        wire = replace(self.wire, **{name: getattr(self.wire, name) + move for name, move in moves.items()})
         try:
             self.readings(wire, {})
         except NO_SUCH_WIRE:
