@@ -34,6 +34,7 @@ from smajax.fit.outputs_of_runs import misfits, predicted_at
 from smajax.fit.packed_runs import RunBatch, simulate_batch
 from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import sensitivity
+from smajax.model.drive.inputs import CommandTerm
 from smajax.model.effects.base import AbstractEffect
 from smajax.model.effects.library import LIBRARY
 from smajax.model.extended import extended
@@ -86,6 +87,25 @@ class _BentScale(AbstractEffect, SensorTerm):
 
     def sensed(self, reading: Scalar, time: Scalar, last: Scalar) -> Scalar:
         return reading + 8e-4 * jnp.sin(reading / 4e-3)
+
+
+class _TiredSupply(AbstractEffect, CommandTerm):
+    """An amplifier that gives ever less of what it is asked for."""
+
+    effect_name: ClassVar[str] = "tired_supply"
+
+    def command(self, channel: str, value: Scalar) -> Scalar:
+        return value / jnp.sqrt(1.0 + (value / 12.0) ** 2)
+
+
+class _SteepStrain(AbstractEffect, ConstitutiveTerm):
+    """A strain that goes with the square of the fraction: hardly any at one end, twice as much as usual at the other."""
+
+    effect_name: ClassVar[str] = "steep_strain"
+
+    def strain(self, wire: Wire, at: WireState) -> Scalar | float:
+        fraction = at.martensite_fraction
+        return 0.9 * wire.constitutive.recoverable_strain * fraction * (fraction - 1.0)
 
 
 @cache
@@ -180,7 +200,12 @@ def test_a_sensors_error_is_added_once_to_every_sample() -> None:
     np.testing.assert_allclose(shown, expected, rtol=0.0, atol=1e-11)
 
 
-HIDDEN: dict[str, type[AbstractEffect]] = {"heat": _JumpingLoss, "constitutive": _WavyStrain, "sensor": _BentScale}
+HIDDEN: dict[str, type[AbstractEffect]] = {
+    "heat": _JumpingLoss,
+    "electrical": _TiredSupply,
+    "constitutive": _WavyStrain,
+    "sensor": _BentScale,
+}
 
 
 @cache
@@ -190,7 +215,7 @@ def _found(equation: str) -> tuple[UnknownTerm, ...]:
 
 @pytest.mark.parametrize(
     ("equation", "level"),
-    often([("heat", 2.0), ("constitutive", 1.1), ("sensor", 1.1)], [("sensor", 1.1)]),
+    often([("heat", 2.0), ("electrical", 1.1), ("constitutive", 1.1), ("sensor", 1.1)], [("sensor", 1.1)]),
 )
 def test_the_equation_of_a_hidden_term_is_ranked_first(equation: str, level: float) -> None:
     """Down to so many times the noise on runs left out, from at least 1.2 times it, and no other equation as well."""
@@ -228,6 +253,17 @@ def test_the_learnt_function_is_the_hidden_one() -> None:
         return values[seen] - line(best.at[seen])
 
     assert np.sqrt(np.mean((bent(best.values) - bent(truth)) ** 2)) < 0.15 * np.std(bent(truth))
+
+
+@pytest.mark.slow
+def test_a_strain_of_the_square_of_the_fraction_is_within_the_bounds() -> None:
+    """Its wave of two half periods is three widths of its prior: a bound of two left 1.22 noises, and another formula."""
+    best = unknown_terms(*_setting(_SteepStrain())).terms[0]
+    assert best.named
+    assert best.name == "unknown_strain_of_fraction"
+    assert best.left_out_after is not None
+    assert best.left_out_after < 1.1 * NOISE
+    assert best.formulas[0].text.endswith("xi^2")
 
 
 @pytest.mark.slow

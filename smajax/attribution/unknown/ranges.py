@@ -58,6 +58,8 @@ def _states(system: System, batch: RunBatch) -> dict[str, np.ndarray]:
         "unknown_reading_of_value": run.reading,
         "unknown_reading_of_time": time,
     }
+    for name in system.drive.inputs_required:  # one of each drive there is
+        found["unknown_command_of_command"] = channels[name] + time * 0.0
     if isinstance(system.load, AbstractMovingLoad):
         lever = float(jnp.asarray(system.load.lever()))
         found["unknown_force_of_displacement"] = lever * (np.asarray(run.position) - float(system.load.start()))
@@ -80,6 +82,7 @@ def _largest(system: System, states: Mapping[str, np.ndarray]) -> dict[str, floa
         "unknown_heat_of_fraction": SHARE * stored,
         "unknown_resistance_of_temperature": SHARE,
         "unknown_resistance_of_fraction": SHARE,
+        "unknown_command_of_command": SHARE,
         "unknown_heating_curve": BENT,
         "unknown_cooling_curve": BENT,
         "unknown_both_curves": BENT,

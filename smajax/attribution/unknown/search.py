@@ -39,6 +39,7 @@ from smajax.fit.integration import unlimited, with_integration
 from smajax.fit.outputs_of_runs import misfits
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.fit.uncertainty import covariance_of, uncertainty
+from smajax.model.channels import INPUT_UNITS
 
 SAME = 1e-3  # of a root mean square: a fit that a hundredth in log evidence may still lower
 
@@ -204,8 +205,10 @@ def _learnt(
     mask = np.asarray(search.problem.batch.mask)
     misfit = misfits(problem, [model.values])[0]
     samples = float(mask.sum()) / correlation_time(split_runs(misfit, mask))
-    reading = search.problem.system.load.reading[1]
-    state_unit, unit = (reading if one == "reading" else one for one in (term.state_unit, term.unit))
+    system = search.problem.system
+    units = {"reading": system.load.reading[1]}
+    units |= dict.fromkeys(["command"], next((INPUT_UNITS[one] for one in system.drive.inputs_required), "-"))
+    state_unit, unit = (units.get(one, one) for one in (term.state_unit, term.unit))
     return UnknownTerm(
         name=term.effect_name,
         title=term.candidate.title,

@@ -34,7 +34,7 @@ INDISTINGUISHABLE = 3.0  # in log odds: twenty to one
 # less of it says nothing.
 APPROXIMATE = 0.01
 PASSES = 2  # the error of a sample is first that of the model without a term, then that of the best with one
-LARGEST = 2.0  # size of a wave: each is then at most as large as the largest function that is sought
+LARGEST = 4.0  # size of a wave, in widths of its prior, which is what holds it: a strain of the square of the fraction needs three
 MUCH = 1e4  # samples times directions of the derivative, of one fit
 AS_NOISE = 0.9  # of residuals that have nothing to do with a term would give it more: beyond that it is not fitted
 # Of the squares that are left, no value of the parameters would take away: beyond that their priors hardly hold them.

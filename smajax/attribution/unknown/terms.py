@@ -15,6 +15,7 @@ from jaxtyping import Array, Float
 
 from smajax.attribution.unknown.spline import COUNT, powers_of, spline
 from smajax.core.parameters import parameter
+from smajax.model.drive.inputs import CommandTerm
 from smajax.model.effects.base import AbstractEffect
 from smajax.model.effects.candidate import Candidate, Equation
 from smajax.model.load.base import AbstractMovingLoad
@@ -27,7 +28,7 @@ from smajax.model.wire.kinetics_terms import ShapeTerm
 from smajax.model.wire.resistance import ResistanceTerm
 from smajax.model.wire.wire import Wire
 
-FORMULA = "f: eleven cosine waves as cubic B-splines, each coefficient twice its share of the largest f that is sought, or less"
+FORMULA = "f: eleven cosine waves as cubic B-splines, each coefficient about twice its share of the usual largest f"
 COEFFICIENTS = tuple(f"c{wave}" for wave in range(COUNT))
 
 
@@ -49,17 +50,17 @@ class AbstractUnknown(AbstractEffect):
     The wave $W_k = \frac12 (1 + (k/2)^4)^{-1/2} \sum_j \cos\big(\pi k (j + 1/2)/11\big) B_j$ has k half periods, of eleven cubic B-splines $B_j$.
     """
 
-    c0: Scalar = parameter("-", -2.0, 2.0, "twice f/s of the constant", default=0.0)
-    c1: Scalar = parameter("-", -2.0, 2.0, "size of the wave of one half period", default=0.0)
-    c2: Scalar = parameter("-", -2.0, 2.0, "size of the wave of two half periods", default=0.0)
-    c3: Scalar = parameter("-", -2.0, 2.0, "size of the wave of three half periods", default=0.0)
-    c4: Scalar = parameter("-", -2.0, 2.0, "size of the wave of four half periods", default=0.0)
-    c5: Scalar = parameter("-", -2.0, 2.0, "size of the wave of five half periods", default=0.0)
-    c6: Scalar = parameter("-", -2.0, 2.0, "size of the wave of six half periods", default=0.0)
-    c7: Scalar = parameter("-", -2.0, 2.0, "size of the wave of seven half periods", default=0.0)
-    c8: Scalar = parameter("-", -2.0, 2.0, "size of the wave of eight half periods", default=0.0)
-    c9: Scalar = parameter("-", -2.0, 2.0, "size of the wave of nine half periods", default=0.0)
-    c10: Scalar = parameter("-", -2.0, 2.0, "size of the wave of ten half periods", default=0.0)
+    c0: Scalar = parameter("-", -4.0, 4.0, "twice f/s of the constant", default=0.0)
+    c1: Scalar = parameter("-", -4.0, 4.0, "size of the wave of one half period", default=0.0)
+    c2: Scalar = parameter("-", -4.0, 4.0, "size of the wave of two half periods", default=0.0)
+    c3: Scalar = parameter("-", -4.0, 4.0, "size of the wave of three half periods", default=0.0)
+    c4: Scalar = parameter("-", -4.0, 4.0, "size of the wave of four half periods", default=0.0)
+    c5: Scalar = parameter("-", -4.0, 4.0, "size of the wave of five half periods", default=0.0)
+    c6: Scalar = parameter("-", -4.0, 4.0, "size of the wave of six half periods", default=0.0)
+    c7: Scalar = parameter("-", -4.0, 4.0, "size of the wave of seven half periods", default=0.0)
+    c8: Scalar = parameter("-", -4.0, 4.0, "size of the wave of eight half periods", default=0.0)
+    c9: Scalar = parameter("-", -4.0, 4.0, "size of the wave of nine half periods", default=0.0)
+    c10: Scalar = parameter("-", -4.0, 4.0, "size of the wave of ten half periods", default=0.0)
     low: Scalar = eqx.field(converter=jnp.asarray, default=0.0)  # x_0, in the state's unit
     width: Scalar = eqx.field(converter=jnp.asarray, default=1.0)  # w
     scale: Scalar = eqx.field(converter=jnp.asarray, default=1.0)  # s, in the function's unit
@@ -141,6 +142,22 @@ class ResistanceOfFraction(AbstractUnknown, ResistanceTerm):
 
     def resistance_factor(self, temperature: Scalar, fraction: Scalar) -> Scalar | float:
         return self.value(fraction)
+
+
+class CommandOfCommand(AbstractUnknown, CommandTerm):
+    """A relative change of what the drive delivers: u -> u [1 + f(u)], of an amplifier that saturates, loses small commands or is not linear."""
+
+    effect_name: ClassVar[str] = "unknown_command_of_command"
+    candidate: ClassVar[Candidate] = _candidate(
+        "a change of what the drive delivers depending on its command", "electrical"
+    )
+    symbol: ClassVar[str] = "u"
+    state: ClassVar[str] = "command of the drive"
+    state_unit: ClassVar[str] = "command"
+    unit: ClassVar[str] = "-"
+
+    def command(self, channel: str, value: Scalar) -> Scalar:
+        return value * (1.0 + self.value(value))
 
 
 def _bent(share: Scalar, by: Scalar) -> Scalar:
@@ -301,6 +318,7 @@ UNKNOWN: dict[str, type[AbstractUnknown]] = {
         HeatOfFraction,
         ResistanceOfTemperature,
         ResistanceOfFraction,
+        CommandOfCommand,
         HeatingCurve,
         CoolingCurve,
         BothCurves,
