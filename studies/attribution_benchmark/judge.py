@@ -35,6 +35,8 @@ CALLED: dict[str, tuple[str, ...]] = {
     "dead_band": ("sensor_backlash",),
     "quantisation": ("sensor_resolution",),
     "input_gain": ("input_level",),
+    # The same heat balance: h x + K (x - c), tau c' = x - c - c/2, is (h + K) (x - w l) of an l that follows x with 2/3 tau, w = 2/3 K/(h + K).
+    "clamp_node": ("warmed_surroundings",),
 }
 EQUATIONS = ("heat", "electrical", "kinetics", "constitutive", "mechanics", "sensor", "input")
 NOTHING, OUTSIDE = "nothing", "not in the library"

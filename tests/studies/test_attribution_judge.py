@@ -91,7 +91,7 @@ def test_an_answer_counts_as_right_for_its_effect_and_its_equation(case: str) ->
 
 
 def test_each_kind_has_its_right_answer() -> None:
-    foreign = _truth("outside", {"clamp_node": "heat"}, outside=True)
+    foreign = _truth("outside", {"convection_regime": "heat"}, outside=True)
     assert judge(_truth("null", {}, strength=0.0), _report("adequate", []), 1.0).right
     assert not judge(_truth("null", {}, strength=0.0), _report("explained", ["creep"]), 1.0).right
     assert judge(_truth("absorbed", HEAT), _report("adequate", []), 1.0).right
@@ -102,6 +102,9 @@ def test_each_kind_has_its_right_answer() -> None:
     assert judge(foreign, _report("partly explained", ["latent_heat"]), 1.0).right
     assert not judge(foreign, _report("explained", ["latent_heat"]), 1.0).right
     assert not judge(foreign, _report("partly explained", ["creep"], unknown="sensor", or_else="heat"), 1.0).right
+    # The library has its heat balance by another name.
+    clamp = judge(_truth("single", {"clamp_node": "heat"}), _report("explained", ["warmed_surroundings"]), 1.0)
+    assert (clamp.kind, clamp.right) == ("single", True)
     # What the library does not hold is outside of it, whatever the generator calls it.
     assert judge(_truth("single", {"cogging": "mechanics"}), _report("adequate", []), 1.0).kind == "outside"
 

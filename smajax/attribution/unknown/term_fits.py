@@ -52,9 +52,13 @@ def with_terms(
 
     One model carries them all, so that one compiled program serves the screening, every fit and every left-out run. `carried`: effects that it has as well, off.
     """
+    # Where the runs go and how many tries they take is asked of the final model alone, whose program is there.
+    alone, index = setting.restricted(final.effects)
+    own_place = final.values[index]
+    found = sought(alone.system_at(jnp.asarray(own_place)), alone.with_own_values(own_place))
+    integration = limited_near(alone, own_place)
     plain, index = setting.restricted((*final.effects, *carried))
     system = plain.system_at(jnp.asarray(final.values[index]))
-    found = sought(system, plain.with_own_values(final.values[index]))
     names = tuple(term.effect_name for term in found.terms)
     whole = dataclasses.replace(system, effects=(*system.effects, *found.terms))
     own = [name for name in parameters(whole) if name.split(".")[0] in names]
@@ -62,7 +66,7 @@ def with_terms(
     known |= setting.prior_records(presets=False)
     own_values = dataclasses.replace(plain.per_run, start=plain.per_run_at(jnp.asarray(final.values[index])))
     # A force that grows with speed lets a load shake: a trial point then takes a hundred times as long as any that a fit ends at.
-    problem = with_integration(plain, limited_near(plain, final.values[index]))
+    problem = with_integration(plain, integration)
     problem = problem.with_system(whole, per_run=own_values, priors=known)
     bounds = {**setting.bounds, **dict.fromkeys(own, (-LARGEST, LARGEST))}
     unknowns = tuple(setting.free(final.effects))
