@@ -19,7 +19,7 @@ from smajax.attribution.config import AttributionConfig
 from smajax.attribution.context import Outcome
 from smajax.attribution.findings import UnknownTerm
 from smajax.attribution.formulas import formulas
-from smajax.attribution.model_fits import Model, Search
+from smajax.attribution.model_fits import Search
 from smajax.attribution.reasons import UnknownTermLikelier
 from smajax.attribution.score_test import Score
 from smajax.attribution.unknown.ranges import Sought
@@ -27,36 +27,21 @@ from smajax.attribution.unknown.search import Lacking, _explains, in_place_of, u
 from smajax.attribution.unknown.spline import COUNT, WAVES, design, powers_of, spline
 from smajax.attribution.unknown.term_fits import _best_of_each, programs_of_terms, with_terms
 from smajax.attribution.unknown.terms import UNKNOWN
-from smajax.core.parameters import parameters
-from smajax.core.result_cache import ResultCache
-from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
 from smajax.fit.outputs_of_runs import misfits, predicted_at
-from smajax.fit.packed_runs import RunBatch, simulate_batch
-from smajax.fit.problem import Problem
+from smajax.fit.packed_runs import simulate_batch
 from smajax.fit.sensitivity import sensitivity
-from smajax.model.drive.inputs import CommandTerm
 from smajax.model.effects.base import AbstractEffect
 from smajax.model.effects.library import LIBRARY
-from smajax.model.extended import extended
-from smajax.model.presets import build
 from smajax.model.sensor_reading import SensorTerm
-from smajax.model.system import System
 from smajax.model.types import Scalar, WireState
 from smajax.model.wire.constitutive import ConstitutiveTerm
 from smajax.model.wire.heat import HeatState, HeatTerm
 from smajax.model.wire.wire import Wire
+from tests.attribution.test_unknown_alike import TiredSupply
 from tests.helpers.often import often
+from tests.helpers.stepped_weight import LEVELS, NOISE, SAMPLES, fitted, hidden_in_runs
 
 close_loop = import_module("smajax.attribution.close_loop")
-DT, SAMPLES, NOISE = 0.05, 180, 1e-4
-BOUNDS = {"convection_coefficient": (50.0, 400.0), "specific_heat": (100.0, 900.0), "recoverable_strain": (0.01, 0.1)}
-# Volts, held for 0.75 s each.
-LEVELS = (
-    (9.0, 9.0, 4.0, 0.0, 8.0, 9.5, 5.5, 3.0, 7.5, 10.0, 2.0, 0.0),
-    (7.0, 8.5, 6.0, 4.5, 10.0, 10.0, 5.0, 1.0, 9.0, 6.5, 3.5, 5.0),
-    (11.0, 8.0, 6.5, 5.0, 0.0, 0.0, 8.5, 9.5, 7.5, 4.0, 9.0, 3.0),
-)
-
 
 DRAWS = 20  # of noise on a function's coefficients
 
@@ -89,63 +74,9 @@ class _BentScale(AbstractEffect, SensorTerm):
         return reading + 8e-4 * jnp.sin(reading / 4e-3)
 
 
-class _TiredSupply(AbstractEffect, CommandTerm):
-    """An amplifier that gives ever less of what it is asked for."""
-
-    effect_name: ClassVar[str] = "tired_supply"
-
-    def command(self, channel: str, value: Scalar) -> Scalar:
-        return value / jnp.sqrt(1.0 + (value / 12.0) ** 2)
-
-
-class _SteepStrain(AbstractEffect, ConstitutiveTerm):
-    """A strain that goes with the square of the fraction: hardly any at one end, twice as much as usual at the other."""
-
-    effect_name: ClassVar[str] = "steep_strain"
-
-    def strain(self, wire: Wire, at: WireState) -> Scalar | float:
-        fraction = at.martensite_fraction
-        return 0.9 * wire.constitutive.recoverable_strain * fraction * (fraction - 1.0)
-
-
-@cache
-def _base() -> System:
-    return build("flexinol_table_3_2", "dead_weight", "voltage")
-
-
-def _inputs() -> dict[str, jax.Array]:
-    return {"voltage": jnp.repeat(jnp.asarray(LEVELS), SAMPLES // len(LEVELS[0]), axis=1)}
-
-
-def _blank() -> RunBatch:
-    shape = (len(LEVELS), SAMPLES)
-    return RunBatch(_inputs(), jnp.zeros(shape), jnp.ones(shape), jnp.zeros((len(LEVELS), 0)), (), DT)
-
-
-def _setting(*hidden: AbstractEffect, seed: int = 5, library: tuple[str, ...] = ()) -> tuple[Search, Model]:
-    """A search, by default without a library, and the base model fitted to runs with something hidden in them."""
-    truth = simulate_batch(dataclasses.replace(_base(), effects=hidden), _blank()).reading
-    noise = NOISE * np.random.default_rng(seed).normal(size=truth.shape)
-    batch = dataclasses.replace(_blank(), output=jnp.asarray(truth + noise))
-    system = extended(_base(), library)
-    problem = Problem.build(system, batch, NOISE, False)
-    table = parameters(system)
-    bounds = {**BOUNDS, **{name: (one.low, one.high) for name, one in table.items() if name.split(".")[0] in library}}
-    search = Search(problem, tuple(BOUNDS), bounds, library, ResultCache())
-    return search, _fitted(search, (), problem.start_values())
-
-
-def _fitted(search: Search, effects: tuple[str, ...], start: np.ndarray) -> Model:
-    problem = search.problem
-    task = problem.task(search.free(effects), search.bounds, start)
-    (fit,) = levenberg_marquardt(problem, [task], FitSettings(tolerance=1e-5))
-    (misfit,) = misfits(problem, [fit.values])
-    return Model(effects, fit.values, fit.cost, misfit, search.rmse(misfit))
-
-
 @cache
 def _screened() -> tuple[Search, np.ndarray, Sought]:
-    return with_terms(*_setting())
+    return with_terms(*hidden_in_runs())
 
 
 def test_the_spline_equals_de_boors() -> None:
@@ -164,7 +95,7 @@ def test_the_spline_equals_de_boors() -> None:
 def test_unknown_terms_at_zero_are_the_base_model() -> None:
     search, values, found = _screened()
     assert {term.effect_name for term in found.terms} == set(UNKNOWN)
-    alone, fitted = _setting()
+    alone, fitted = hidden_in_runs()
     (with_all,) = predicted_at(search.problem, [values])
     (without,) = predicted_at(alone.problem, [fitted.values])
     np.testing.assert_allclose(with_all, without, rtol=0.0, atol=1e-11)
@@ -202,7 +133,7 @@ def test_a_sensors_error_is_added_once_to_every_sample() -> None:
 
 HIDDEN: dict[str, type[AbstractEffect]] = {
     "heat": _JumpingLoss,
-    "electrical": _TiredSupply,
+    "electrical": TiredSupply,
     "constitutive": _WavyStrain,
     "sensor": _BentScale,
 }
@@ -210,7 +141,7 @@ HIDDEN: dict[str, type[AbstractEffect]] = {
 
 @cache
 def _found(equation: str) -> tuple[UnknownTerm, ...]:
-    return unknown_terms(*_setting(HIDDEN[equation].base())).terms
+    return unknown_terms(*hidden_in_runs(HIDDEN[equation].base())).terms
 
 
 @pytest.mark.parametrize(
@@ -256,25 +187,14 @@ def test_the_learnt_function_is_the_hidden_one() -> None:
 
 
 @pytest.mark.slow
-def test_a_strain_of_the_square_of_the_fraction_is_within_the_bounds() -> None:
-    """Its wave of two half periods is three widths of its prior: a bound of two left 1.22 noises, and another formula."""
-    best = unknown_terms(*_setting(_SteepStrain())).terms[0]
-    assert best.named
-    assert best.name == "unknown_strain_of_fraction"
-    assert best.left_out_after is not None
-    assert best.left_out_after < 1.1 * NOISE
-    assert best.formulas[0].text.endswith("xi^2")
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("hidden", ["sensor", "latent_heat"])
 def test_an_unknown_function_replaces_effects_that_are_less_likely(hidden: str) -> None:
     """A latent heat, fitted to runs in which the sensor's scale is bent, and to runs in which there is one."""
     there = LIBRARY["latent_heat"](enthalpy=20e3) if hidden == "latent_heat" else HIDDEN[hidden].base()
-    setting, first = _setting(there, library=("latent_heat",))
+    setting, first = hidden_in_runs(there, library=("latent_heat",))
     start = np.array(first.values)
     start[setting.problem.names.index("latent_heat.enthalpy")] = 5e3
-    effects = _fitted(setting, ("latent_heat",), start)
+    effects = fitted(setting, ("latent_heat",), start)
     found = in_place_of(setting, first, effects)
     assert (found is not None) == (hidden == "sensor")
     if found is not None:
@@ -292,7 +212,7 @@ def test_an_unknown_function_replaces_effects_that_are_less_likely(hidden: str) 
 @pytest.mark.parametrize("there", [True, False], ids=["there too", "another bench"])
 def test_held_out_runs_validate_a_term_or_reject_it(there: bool) -> None:
     """Of a bent scale: a held-out run that was read on it, and one that was not."""
-    setting, first = _setting(_BentScale.base())
+    setting, first = hidden_in_runs(_BentScale.base())
     batch = setting.problem.batch
     plain = simulate_batch(setting.problem.system_at(jnp.asarray(first.values)), batch).reading
     setting.held_out = dataclasses.replace(batch, output=batch.output if there else plain)
@@ -305,7 +225,7 @@ def test_held_out_runs_validate_a_term_or_reject_it(there: bool) -> None:
     assert (best.held_out_after < best.held_out_before) == there
 
 
-def test_terms_that_gain_less_than_of_noise_are_not_fitted() -> None:
+def test_terms_that_gain_less_than_of_noise_are_notfitted() -> None:
     # Of eleven coefficients noise gives 11 squares of an independent sample on average, and less than 5.6 in one of ten.
     gains = {"unknown_heating_curve": 0.3, "unknown_force_of_speed": 0.06, "unknown_loss_of_temperature": 0.05}
     scores = [Score((name,), gain, 0.5, dict.fromkeys(map(str, range(11)), 0.0)) for name, gain in gains.items()]
@@ -333,7 +253,7 @@ def test_every_term_is_in_one_program_and_one_of_the_speed_in_its_own() -> None:
 
 
 def test_without_a_missing_effect_no_unknown_term_is_named() -> None:
-    terms = unknown_terms(*_setting()).terms
+    terms = unknown_terms(*hidden_in_runs()).terms
     assert terms
     assert not any(term.named for term in terms)
     assert all(term.log_odds < 0.0 for term in terms)

@@ -10,6 +10,7 @@ import numpy as np
 
 from smajax.attribution.unknown.terms import UNKNOWN, AbstractUnknown
 from smajax.fit.packed_runs import RunBatch, simulate_batch
+from smajax.model.drive.inputs import acting
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.load.coupon import AbstractCoupon
 from smajax.model.system import System
@@ -18,9 +19,9 @@ from smajax.model.wire.heat import cross_section, mass_per_metre
 SPARED = 1e-3  # share of the samples on either side that may lie outside: a speed has peaks of one sample
 MARGIN = 0.02  # of the range, beyond it
 SAME = 1e-3  # of its own size: a state that moves by less is a constant
-# Sizes of the largest function that is sought, half as much again as a standard deviation of its prior: the curve stays monotonic, |f| + |f'|/4 < 1, at 0.4
+# Usual sizes of the function that is sought, half as much again as a standard deviation of its prior: the curve stays monotonic, |f| + |f'|/4 < 1, at 0.4
 # (but for one in thirty of the functions of that prior);
-# a softening of the wire stays below its stiffness at 0.15; transformation strain stays positive at 0.15 eps_L.
+# a softening of the wire stays below its stiffness at 0.15; transformation strain stays positive at 0.15 eps_L. Larger ones are unlikely by the prior, and no bound forbids them.
 BENT, SOFTER, STRETCHED = 0.4, 0.15, 0.15
 SHARE = 0.5  # of what the equation has in it: heat loss, stored heat, resistance, force, reading
 
@@ -58,13 +59,19 @@ def _states(system: System, batch: RunBatch) -> dict[str, np.ndarray]:
         "unknown_reading_of_value": run.reading,
         "unknown_reading_of_time": time,
     }
-    for name in system.drive.inputs_required:  # one of each drive there is
-        found["unknown_command_of_command"] = channels[name] + time * 0.0
+    for name in system.drive.inputs_required:  # each drive has one
+        found["unknown_command_of_command"] = np.asarray(_acting(system, name, channels[name]))
     if isinstance(system.load, AbstractMovingLoad):
         lever = float(jnp.asarray(system.load.lever()))
         found["unknown_force_of_displacement"] = lever * (np.asarray(run.position) - float(system.load.start()))
         found["unknown_force_of_speed"] = lever * np.asarray(run.velocity)
     return {name: np.asarray(series)[seen] for name, series in found.items()}
+
+
+def _acting(system: System, channel: str, recorded: np.ndarray) -> jnp.ndarray:
+    """What the model's effects make of the drive's recorded commands, any shape."""
+    acted = jnp.vectorize(lambda value: acting(system.drive, system.terms.supply.commands, {channel: value})[channel])
+    return acted(jnp.asarray(recorded))
 
 
 def _largest(system: System, states: Mapping[str, np.ndarray]) -> dict[str, float]:

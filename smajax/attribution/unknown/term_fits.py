@@ -34,8 +34,10 @@ INDISTINGUISHABLE = 3.0  # in log odds: twenty to one
 # less of it says nothing.
 APPROXIMATE = 0.01
 PASSES = 2  # the error of a sample is first that of the model without a term, then that of the best with one
-LARGEST = 4.0  # size of a wave, in widths of its prior, which is what holds it: a strain of the square of the fraction needs three
+# Size of a wave for the score test, which has no prior, and for a fit, in which the prior holds it: a strain of the square of the fraction needs three.
+USUAL, LARGEST = 2.0, 4.0
 MUCH = 1e4  # samples times directions of the derivative, of one fit
+AS_MUCH = 0.9  # of the gain of the best of an equation: another of it is fitted too
 AS_NOISE = 0.9  # of residuals that have nothing to do with a term would give it more: beyond that it is not fitted
 # Of the squares that are left, no value of the parameters would take away: beyond that their priors hardly hold them.
 HARDLY_HELD = 0.5
@@ -93,7 +95,8 @@ def screened(setting: Search, values: np.ndarray) -> tuple[list[Score], float]:
     loose = setting.loose((), values)
     whole, beside = at.residual(), without(at, loose)[1]
     share = float(beside @ beside) / max(float(whole @ whole), TINY)
-    return ranked(at, loose, setting.candidates, setting.bounds), share
+    bounds = {**setting.bounds, **{name: (-USUAL, USUAL) for name in setting.every if name.split(".")[0] in UNKNOWN}}
+    return ranked(at, loose, setting.candidates, bounds), share
 
 
 def _gains_as_of_noise(score: Score, squares: float) -> bool:
@@ -104,14 +107,17 @@ def _gains_as_of_noise(score: Score, squares: float) -> bool:
 def _best_of_each(scores: Sequence[Score], count: int, squares: float) -> list[Score]:
     """The best of each equation first, then the others by gain; `count` of them without those that gain as of noise, or the best alone if any gains anything.
 
-    `squares`: as of `_gains_as_of_noise`.
+    Beside them those of an equation that gain nearly as much as its best: about the base model a change of the command and one of the resistance look much
+    the same, and fitted only one of them comes to the noise. `squares`: as of `_gains_as_of_noise`.
     """
     firsts: dict[str, Score] = {}
     for score in scores:
         firsts.setdefault(UNKNOWN[score.effects[0]].candidate.equation, score)
     leading = list(firsts.values())
     rest = [score for score in scores if score not in leading]
-    found = [score for score in [*leading, *rest][:count] if score.gain > 0.0]
+    alike = [one for one in rest if one.gain > AS_MUCH * firsts[UNKNOWN[one.effects[0]].candidate.equation].gain]
+    chosen = dict.fromkeys(one.effects[0] for one in [*[*leading, *rest][:count], *alike])
+    found = [score for score in scores if score.effects[0] in chosen and score.gain > 0.0]
     return [score for score in found if not _gains_as_of_noise(score, squares)] or found[:1]
 
 

@@ -145,7 +145,10 @@ class ResistanceOfFraction(AbstractUnknown, ResistanceTerm):
 
 
 class CommandOfCommand(AbstractUnknown, CommandTerm):
-    """A relative change of what the drive delivers: u -> u [1 + f(u)], of an amplifier that saturates, loses small commands or is not linear."""
+    """A relative change of what the drive delivers: u -> u [1 + f(u)], of an amplifier that saturates, loses small commands or is not linear.
+
+    u is the command as the effects before it leave it, and what comes of it has its sign: a negative power would cool the wire.
+    """
 
     effect_name: ClassVar[str] = "unknown_command_of_command"
     candidate: ClassVar[Candidate] = _candidate(
@@ -157,7 +160,8 @@ class CommandOfCommand(AbstractUnknown, CommandTerm):
     unit: ClassVar[str] = "-"
 
     def command(self, channel: str, value: Scalar) -> Scalar:
-        return value * (1.0 + self.value(value))
+        kept = 1.0 + self.value(value)
+        return value * jnp.where(kept > 0.0, kept, 0.0)
 
 
 def _bent(share: Scalar, by: Scalar) -> Scalar:

@@ -101,4 +101,5 @@ def _or_listed(terms: Sequence[UnknownTerm]) -> str:
 def units(term: UnknownTerm) -> str:
     """`f in W/m, T - T_inf in K`."""
     named = ((name, unit) for name, unit in (("f", term.unit), (term.symbol, term.state_unit)))
-    return ", ".join(f"{name} in {unit}" if unit != "-" else f"{name} a plain number" for name, unit in named)
+    plain = "-", "1"
+    return ", ".join(f"{name} a plain number" if unit in plain else f"{name} in {unit}" for name, unit in named)
