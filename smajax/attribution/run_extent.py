@@ -43,8 +43,15 @@ def _whole_way(problem: Problem, lowest: float, highest: float) -> tuple[float, 
     return start, start + float(load.travel(wire, wire.constitutive.recoverable_strain))
 
 
+def _largest_command(problem: Problem) -> float:
+    """Of the drive's channel while the runs are measured, in its unit; 0 without a drive."""
+    batch = problem.batch
+    channels = [np.asarray(batch.inputs[name]) for name in problem.system.drive.inputs_required]
+    return max((float(np.abs(one[batch.measured]).max()) for one in channels), default=0.0)
+
+
 def extent_of(problem: Problem) -> Extent:
-    """Length of a typical run, range of all readings, the increment at which they lie, the lowest and highest of them, and whether the load is one force."""
+    """Length of a typical run, range of all readings, the increment at which they lie, the lowest and highest of them, whether the load is one force, and the largest command."""
     batch = problem.batch
     names = (problem.system.load.reading[0], "reading")  # effects of a sensor are of the load's own
     which = next((place for place, name in enumerate(batch.outputs) if name in names), None)
@@ -59,4 +66,5 @@ def extent_of(problem: Problem) -> Extent:
     one_force = _one_force(problem, *ends)
     seen = batch.measured
     samples = seen.shape[1] - np.argmax(seen[:, ::-1], axis=1)  # to the last measured one
-    return Extent(float(np.median(samples) * batch.dt), stroke, increment, lowest, highest, one_force)
+    seconds = float(np.median(samples) * batch.dt)
+    return Extent(seconds, stroke, increment, lowest, highest, one_force, _largest_command(problem))

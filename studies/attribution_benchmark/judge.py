@@ -15,6 +15,7 @@ from smajax.model.effects.library import LIBRARY
 # view; some of the library's forms were widened after cases that it missed (README.md). The generator's smooth transformation, a share of the wire over a wider range, is the library's of two parts. The curve of the transformation has all their shapes.
 CALLED: dict[str, tuple[str, ...]] = {
     "drive_dead_zone": ("dead_zone",),
+    "drive_saturation": ("amplifier_saturation",),
     "supply_sag": ("supply_sag", "supply_memory"),
     "pwm": ("pwm_smoothing", "pulsed_voltage"),
     "stress_rate_share": ("enhanced_conditions", "liang_conditions"),

@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 
 from smajax.core.parameters import set_parameters
 from smajax.data.model_catalogue import applicable, candidates
+from smajax.model.effects.candidate import Extent
 from smajax.model.effects.library import LIBRARY
 from smajax.model.extended import extended
 from smajax.model.presets import build
@@ -159,3 +160,29 @@ def test_a_dead_zone_passes_almost_nothing_below_its_threshold() -> None:
     assert float(zone.command("voltage", jnp.asarray(-20.0))) == pytest.approx(-19.9, abs=1e-3)
     slope = jax.grad(lambda limit: LIBRARY["dead_zone"](threshold=limit).command("duty", jnp.asarray(0.0)))
     assert float(slope(jnp.asarray(0.0))) == 0.0
+
+
+def test_a_saturation_passes_small_commands_and_loses_a_share_of_what_is_beyond_its_limit() -> None:
+    clipping = LIBRARY["amplifier_saturation"](lost=1.0, limit=6.0, softness=0.02)
+
+    def passed(value: float) -> float:
+        return float(clipping.command("voltage", jnp.asarray(value)))
+
+    assert passed(3.0) == pytest.approx(3.0, abs=0.01)
+    assert passed(9.0) == pytest.approx(6.0, abs=0.01)
+    assert passed(-9.0) == -passed(9.0)
+    assert passed(0.0) == 0.0
+    half = LIBRARY["amplifier_saturation"](lost=0.5, limit=6.0, softness=0.02)
+    assert float(half.command("voltage", jnp.asarray(9.0))) == pytest.approx(7.5, abs=0.01)
+    # However soft, more of the command never gives less.
+    for softness in (0.01, 0.3, 3.0):
+        soft = LIBRARY["amplifier_saturation"](lost=1.0, limit=6.0, softness=softness)
+        assert np.all(np.diff(np.asarray(soft.command("voltage", jnp.linspace(0.0, 20.0, 400)))) >= 0.0)
+
+
+def test_a_saturation_is_sought_below_the_largest_command_of_the_runs() -> None:
+    bounds = LIBRARY["amplifier_saturation"].candidate.bounds
+    assert bounds(Extent(20.0, 1e-3, 0.0, command=10.0)) == {"limit": (1.0, 12.0)}
+    assert bounds(Extent(20.0, 1e-3, 0.0)) == {}  # an oven has no command
+    grid = LIBRARY["amplifier_saturation"].candidate.grid(Extent(20.0, 1e-3, 0.0, command=10.0))
+    assert [place["limit"] for place in grid] == [5.0, 7.0, 8.5]

@@ -31,7 +31,7 @@ DELAY = "delay"
 CONVECTION_OF_TEMPERATURE = "convection that depends on the temperature"
 LOST_MOTION = "lost motion where it turns"
 
-Scale = Literal["", "stroke", "increment", "run", "load", "1/run", "stroke/run"]
+Scale = Literal["", "stroke", "increment", "run", "load", "command", "1/run", "stroke/run"]
 SCALES: tuple[str, ...] = get_args(Scale)
 Origin = Literal["", "lowest", "highest"]
 ORIGINS: tuple[str, ...] = get_args(Origin)
@@ -46,6 +46,7 @@ class Extent(NamedTuple):
     lowest: float = 0.0  # reading of all, SI
     highest: float = 0.0  # reading of all, SI; as `lowest`: not known
     one_force: bool = False  # whether the load pulls with the same force in all runs, wherever it is
+    command: float = 0.0  # largest of the drive's channel in all runs, SI; 0 without a drive
 
 
 def several_forces(extent: Extent) -> bool:
@@ -67,7 +68,7 @@ class Width(NamedTuple):
 
     `of` says what `sigma` and `base` are multiplied by: "stroke" is the range of all readings (m, rad on an arm, - for a
     strain), "increment" that of the readings, "run" the length of a run (s), "load" the load's force at rest at its start
-    (N, N m on an arm), "1/run" one over the length of a run and "stroke/run" the stroke over it, for rates; "" is nothing.
+    (N, N m on an arm), "command" the largest one of all runs (V, A, W or a duty), "1/run" one over the length of a run and "stroke/run" the stroke over it, for rates; "" is nothing.
     `above`: what `base` counts from, zero or the lowest or the highest of all readings.
     """
 

@@ -35,6 +35,7 @@ _NAMES = (
     "supply_sag",
     "supply_memory",
     "dead_zone",
+    "amplifier_saturation",
     "pwm_smoothing",
     "pulsed_voltage",
     "transformation_curve",

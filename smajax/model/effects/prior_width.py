@@ -29,6 +29,7 @@ _PHRASES: dict[Scale, str] = {
     "increment": "of the increment",
     "run": "of a run's length",
     "load": "of the load at rest",
+    "command": "of the largest command",
     "stroke/run": "of the stroke per run",
 }
 _ORIGIN_PHRASES: dict[Origin, str] = {"lowest": " above the lowest reading", "highest": " above the highest reading"}
@@ -117,6 +118,7 @@ def _scale(of: Scale, extent: Extent, load_at_rest: float) -> float:
         "increment": extent.increment,
         "run": extent.seconds,
         "load": abs(load_at_rest),
+        "command": extent.command,
         "1/run": 1.0 / extent.seconds if lasts else 0.0,
         "stroke/run": extent.stroke / extent.seconds if lasts else 0.0,
     }

@@ -1,0 +1,86 @@
+"""An amplifier or a supply at the end of its range: large commands do not come through whole."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import jax.numpy as jnp
+
+from smajax.core.parameters import parameter
+from smajax.model.drive.inputs import CommandTerm
+from smajax.model.effects.base import AbstractEffect
+from smajax.model.effects.candidate import Actuator, Candidate, Extent, Width
+from smajax.model.types import Scalar
+
+AT, SOFT = (
+    (0.5, 0.7, 0.85),
+    (1.0, 0.1, 0.1),
+)  # knees that are tried: shares of the largest command, and how soft each is
+
+
+def _applies(system: Actuator) -> bool:
+    return bool(system.drive.inputs_required)
+
+
+def _observable(extent: Extent) -> bool:
+    return extent.command > 0.0
+
+
+def _bounds(extent: Extent) -> dict[str, tuple[float, float]]:
+    # Beyond the largest command nothing is lost, and far below it all is a gain.
+    return {"limit": (0.1 * extent.command, 1.2 * extent.command)} if extent.command > 0.0 else {}
+
+
+def _grid(extent: Extent) -> tuple[dict[str, float], ...]:
+    return tuple({"limit": share * extent.command, "softness": soft} for share, soft in zip(AT, SOFT, strict=True))
+
+
+def _beyond(size: Scalar, limit: Scalar, softness: Scalar) -> Scalar:
+    """How far a command is beyond the limit, rounded over `softness` of it: half a hyperbola."""
+    over = size - limit
+    return 0.5 * (over + jnp.sqrt(over * over + (softness * limit) ** 2))
+
+
+class AmplifierSaturation(AbstractEffect, CommandTerm):
+    r"""$|u| \to |u| - r\,[e(|u|) - e(0)]$ with $e(x) = \frac12 \{x - L + \sqrt{(x - L)^2 + (w L)^2}\}$, the sign of u kept.
+
+    Of what is beyond the limit L the share r is lost: with r = 1 and a small w a clipping at L, with a large w a gain that falls gently.
+    """
+
+    lost: Scalar = parameter("-", 0.0, 1.0, "r: share of the command beyond the limit that is lost", default=0.0)
+    limit: Scalar = parameter(
+        "-", 1e-3, 1e3, "L: limit, a number of V, A, W or duty as the drive's channel is", default=1.0
+    )
+    softness: Scalar = parameter("-", 0.01, 3.0, "w: how soft the knee is, over the limit", default=0.1)
+
+    effect_name: ClassVar[str] = "amplifier_saturation"
+    candidate: ClassVar[Candidate] = Candidate(
+        title="saturation of the amplifier",
+        equation="electrical",
+        formula="|u| -> |u| - r [e(|u|) - e(0)], e(x) = {x - L + sqrt((x - L)^2 + (w L)^2)}/2 (a clipping, smoothed)",
+        sentence="The amplifier or its supply is near the end of its range: of a large command less comes through.",
+        switches=("lost",),
+        initial_guess={"lost": 0.3, "limit": 1.0, "softness": 0.1},
+        applies=_applies,
+        observable=_observable,
+        bounds=_bounds,
+        grid=_grid,
+        prior_class="bench",
+        widths={
+            "lost": Width(0.5, "from a gain that falls to a supply that clips"),
+            "limit": Width(
+                0.5, "below the largest command, or nothing is lost", of="command", logarithmic=True, base=0.7
+            ),
+            "softness": Width(
+                1.5,
+                "a transistor stage clips within a tenth, a battery falls over all of its range",
+                logarithmic=True,
+                base=0.2,
+            ),
+        },
+    )
+
+    def command(self, channel: str, value: Scalar) -> Scalar:
+        size = jnp.abs(value)
+        beyond, at_rest = (_beyond(one, self.limit, self.softness) for one in (size, jnp.zeros_like(size)))
+        return jnp.sign(value) * (size - self.lost * (beyond - at_rest))
