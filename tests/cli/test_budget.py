@@ -164,6 +164,25 @@ def test_a_time_that_is_over_says_that_fits_are_cached_only_where_they_are(
     assert f"the page in {report} is of an earlier run" in " ".join(smajax(*words).said.split())
 
 
+def test_a_time_that_is_over_shows_what_an_earlier_run_of_the_same_experiment_knew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    report = tmp_path / "report"
+    report.mkdir()
+    known = {"title": "My bench", "verdict": "not finished", "summary": ["A sag."], "remaining": "the checks"}
+    (report / "report.json").write_text(json.dumps(known), encoding="utf-8")
+
+    def claims(seconds: float, words: list[str]) -> None:
+        (report / ".smajax.json").write_text("{}", encoding="utf-8")
+
+    monkeypatch.setattr("smajax.cli.budget.run_within", claims)
+    ended = smajax("close-loop", "mine.toml", "--out", str(report), "--budget", "1s")
+    assert ended.code == 3
+    assert "My bench" in ended.out
+    assert "A sag." in ended.out
+    assert "before this run knew more than the earlier one, of which that is; the same command resumes" in ended.said
+
+
 def test_a_command_that_ends_in_time_is_as_without_a_budget() -> None:
     assert run_within(60.0, ["--version"]) == 0
     assert run_within(60.0, ["close-loop", "none.toml"]) == 2

@@ -99,15 +99,19 @@ def _print_answer(title: str, verdict: str, summary: Sequence[str], page: Path) 
 def _within(seconds: float, out: Path, json_out: bool) -> None:
     """The command without --budget, ended in that time; then the page says what is known. Exits with 3 where it was ended."""
     from smajax.cli.budget import run_within, without
+    from smajax.cli.result_folder import MARK
     from smajax.core.wording import verdict_text
 
-    before = (out / RECORD).stat().st_mtime_ns if (out / RECORD).is_file() else None
+    shown, mark = out / RECORD, out / MARK
+    before, claimed_before = _written(shown), _written(mark)
     code = run_within(seconds, without(sys.argv[1:], "--budget"))
     if code is not None:
         raise typer.Exit(code)
-    shown = out / RECORD
     resumes = "the same command resumes from the finished fits"
-    if not shown.is_file() or shown.stat().st_mtime_ns == before:
+    anew = _written(shown) != before
+    # A folder is claimed for one experiment: the page that was in it is of an earlier run of the same.
+    same = before is not None and _written(mark) != claimed_before
+    if not anew and not same:
         page = f"the page in {out} is of an earlier run" if shown.is_file() else "there is no page"
         if not any(out.glob(FITS)):
             resumes = "nothing was finished, so that the same command starts from the beginning: give it more time"
@@ -120,8 +124,17 @@ def _within(seconds: float, out: Path, json_out: bool) -> None:
         at_bounds = [*known.get("coefficients_at_bounds", []), *known.get("unknowns_at_bounds", [])]
         said = verdict_text(known["verdict"], at_bounds, doubt=known.get("held_out_runs", ""))
         _print_answer(known["title"], said, known["summary"], out / "report.html")
-    typer.echo(f"The time was over before: {known['remaining'] or 'the controllers were tuned'}; {resumes}.", err=True)
+    if anew:
+        still = f"The time was over before: {known['remaining'] or 'the controllers were tuned'}"
+    else:
+        still = "The time was over before this run knew more than the earlier one, of which that is"
+    typer.echo(f"{still}; {resumes}.", err=True)
     raise typer.Exit(UNMET)
+
+
+def _written(path: Path) -> int | None:
+    """When a file was written, ns; None where there is none."""
+    return path.stat().st_mtime_ns if path.is_file() else None
 
 
 def tune_on_models(
