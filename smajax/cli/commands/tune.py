@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -31,6 +32,7 @@ from smajax.cli.terminal import browse, command_line, console, resumable
 if TYPE_CHECKING:
     from smajax.control.gains_file import Gains
     from smajax.control.plants import Plants
+    from smajax.control.reach import Reach
     from smajax.control.tune.settings import TuneSettings
     from smajax.model.system import System
     from smajax.report.next_steps import PlantWords
@@ -99,6 +101,27 @@ def _variation(several: Sequence[str] | None, plant: System) -> dict[str, float]
     return variation
 
 
+def _higher_limit(reach: Reach, plant: System, settings: TuneSettings) -> dict[str, float]:
+    """The drive's limit for what limits the controller's command, where the preset's is lower and too low for a set point; none where it is given."""
+    from smajax.control.reach import out_of_reach
+
+    limit = float(plant.drive.largest_command())
+    if reach.by_drive or not math.isfinite(limit) or set(reach.parameters) & set(settings.fixed):
+        return {}
+    too_high = any(one > reach.high for one in out_of_reach(reach, plant, settings.set_points))
+    return dict.fromkeys(reach.parameters, limit) if too_high else {}
+
+
+def _said_of_limit(reach: Reach, settings: TuneSettings, limit: float) -> str:
+    from smajax.core.display_units import digits
+
+    own, largest = (f"{digits(one, 4)} {reach.unit.command}" for one in (reach.command, limit))
+    return (
+        f"The preset of {settings.controller} gives up to {own} on this plant, with which the load comes to rest below "
+        f"{max(settings.set_points):g} {reach.unit.shown}: here it may give what the drive can, {largest}."
+    )
+
+
 def _run(
     plant: System,
     settings: TuneSettings,
@@ -127,6 +150,10 @@ def _run(
         settings.check(plant, plants)
         made = replace(CONTROLLERS[settings.controller], fixed=settings.fixed).make(plant)
         reach = reach_of(plant, made)
+        if typed and reach is not None and (higher := _higher_limit(reach, plant, settings)):
+            typer.echo(_said_of_limit(reach, settings, next(iter(higher.values()))), err=True)
+            settings = replace(settings, fixed={**settings.fixed, **higher})
+            reach = reach_of(plant, replace(CONTROLLERS[settings.controller], fixed=settings.fixed).make(plant))
         beyond = () if typed else out_of_reach(reach, plant, settings.set_points)
         if reach is not None and 0 < len(beyond) < len(settings.set_points):
             left = tuple(one for one in settings.set_points if one not in beyond)
