@@ -236,10 +236,11 @@ def _error(result: Identified, output: int) -> str:
         for role, error in rms_by_role(result, output).items()
     )
     whose = f"Error of the {label(one.name)} (rms)" if len(result.outputs) > 1 else "Error (rms)"
-    noise = f"noise {digits(unit.of(one.noise_sigma), 3)} {unit.unit}, {one.noise_how}"
-    if one.noise_before is not None:
-        noise += f" (its differences show {digits(unit.of(one.noise_before), 3)} {unit.unit})".replace(" )", ")")
-    return f"{whose}: {errors}; {noise}.".replace(" ,", ",")
+    sigma = f"{digits(unit.of(one.noise_sigma), 3)} {unit.unit}".strip()
+    if one.noise_before is None:
+        return f"{whose}: {errors}; noise {sigma}, {one.noise_how}."
+    own = f"{digits(unit.of(one.noise_before), 3)} {unit.unit}".strip()
+    return f"{whose}: {errors}; noise {own} by differences of neighbouring samples; the fit weighs a sample by {sigma}, which is what the model leaves."
 
 
 def _worse_held_out(result: Identified) -> list[str]:

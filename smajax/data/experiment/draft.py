@@ -331,6 +331,10 @@ def _channels(inputs: _Inputs) -> _Section:
                 ),
                 "",
             ]
+            if role == "output":
+                messages.append(
+                    f"{one.name}: a further output, a comment in the draft: remove the # where it is of this wire"
+                )
     return _Section(lines, messages)
 
 

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from smajax.data.experiment.column_guess import GUESS, LIKELY, SURE, Column
 from smajax.data.experiment.toml_file import toml_value
 
+ABSOLUTE = ("temperature", "resistance")  # whose zero nobody sets from run to run, as that of a position
+
 
 def _key(column: Column, variable: bool) -> str:
     word = "variable" if variable else "column"
@@ -24,6 +26,10 @@ def channel_lines(name: str, role: str, column: Column, variable: bool, off: boo
     if role == "output":
         lines += ['missing = "skip"  # empty cells are omitted'] if gaps else []
         lines.append('noise = "estimate"  # or its sigma, such as "0.01 mm"')
+        if name in ABSOLUTE:
+            lines.append(
+                "offset = false  # what the sensor shows is true as it is: a zero of each run would hide what the model lacks"
+            )
         lines += [] if off else ["# reversed = true  # where the sensor counts the other way: down when the wire pulls"]
     return [f"# {line}" if off else line for line in lines]
 

@@ -252,7 +252,7 @@ def _unconfirmed(findings: Findings) -> list[str]:
     if not (findings.added and _held_out(findings)) or caveats.held_out_comparison(findings) != "alike":
         return []
     return [
-        "The held-out runs neither confirm nor refute it: how far the base model and the extended model differ there may be chance."
+        "The held-out runs neither confirm nor refute it: errors of neighbouring samples go together, and by so few independent ones the difference between the base model and the extended model may be chance."
     ]
 
 
