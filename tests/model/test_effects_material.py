@@ -338,41 +338,6 @@ def test_a_lagging_transformation_follows_the_stress_late_too():
     assert half[1] - half[0] == pytest.approx(tau * rate, rel=2e-3)
 
 
-def test_a_small_loop_begins_its_way_back_earlier_and_a_full_one_where_it_did():
-    inputs = _inputs(temperature=_ramps(20.0, 110.0, 55.0, 110.0, 20.0), stress=np.full(360, 60e6))
-    plain = simulate_compiled(COUPON, inputs, DT)
-    on = {"minor_loops.heating": 0.5, "minor_loops.cooling": 0.5}
-    run = simulate_compiled(extended(COUPON, ("minor_loops",), on), inputs, DT)
-    half_cooled = float(plain.martensite_fraction[179])
-    assert 0.2 < half_cooled < 0.8
-    for whole in (slice(0, 180), slice(270, 360)):
-        np.testing.assert_allclose(run.martensite_fraction[whole], plain.martensite_fraction[whole], atol=1e-12)
-    law, back = COUPON.wire.kinetics, slice(180, 270)
-    at = [
-        np.interp(-half_cooled / 2, -one.martensite_fraction[back], inputs["temperature"][back]) for one in (plain, run)
-    ]
-    earlier = 0.5 * (1.0 - half_cooled) * float(law.austenite_finish - law.austenite_start)
-    assert at[0] - at[1] == pytest.approx(earlier, abs=0.05)
-
-
-def test_a_small_loop_may_end_where_the_full_one_does_and_the_smallest_be_shifted_least():
-    inputs = _inputs(temperature=_ramps(20.0, 110.0, 55.0, 110.0, 20.0), stress=np.full(360, 60e6))
-    plain = simulate_compiled(COUPON, inputs, DT)
-    on = {"minor_loops.heating": 0.5, "minor_loops.small": 1.0, "minor_loops.pinned": 1.0}
-    run = simulate_compiled(extended(COUPON, ("minor_loops",), on), inputs, DT)
-    left, back = float(plain.martensite_fraction[179]), slice(180, 270)
-    law = COUPON.wire.kinetics
-    width, early = float(law.austenite_finish - law.austenite_start), 0.5 * (1.0 - left) * left
-
-    def reached(one, fraction):
-        return np.interp(-fraction, -one.martensite_fraction[back], inputs["temperature"][back])
-
-    start = float(law.austenite_start) + 60e6 / float(law.stress_slope_austenite)
-    for share in (0.9, 0.5, 0.1):  # of what was left: the range begins e earlier and ends where it did
-        z = (reached(plain, share * left) - start) / width
-        assert reached(run, share * left) == pytest.approx(start + width * (z * (1.0 + early) - early), abs=0.05)
-
-
 def test_a_reading_is_the_position_changed_by_the_sensors_faults():
     """Gain, drift, zero and backlash in the library's order, from the first sample on."""
     names = ("sensor_gain", "sensor_drift", "sensor_offset", "sensor_backlash")

@@ -129,7 +129,7 @@ def _stripped(effect: str, **changed: Any) -> Any:
         ("radiation", "emissivity", CoefficientPrior(0.0, 0.5, False)),  # twice 0.3, within half of 0 to 1
         ("phase_resistance", "contrast", CoefficientPrior(0.0, 0.2, False)),  # the initial guess is negative
         ("creep", "time_constant", CoefficientPrior(5.0, 1.0, True)),  # positive
-        ("minor_loops", "pinned", CoefficientPrior(0.0, 0.25, False)),  # from 0 on
+        ("minor_loops", "pinned", CoefficientPrior(0.5, 0.25, False)),  # a quarter of the bounds
     ],
 )
 def test_an_effect_without_declared_widths_has_default_ones(

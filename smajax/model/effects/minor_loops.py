@@ -24,20 +24,29 @@ def _grid(extent: Extent) -> tuple[dict[str, float], ...]:
 
 
 class MinorLoops(AbstractEffect, RangeTerm):
-    r"""$z_A \to z_A + e (1 - k z_A) / (1 + k e)$ with $e = a\,m (1 - r\,m)$, $m = 1 - \xi_M$; $1 - z_M$ alike with b and $m = \xi_A$.
+    r"""$z_A \to z_A + e (1 - k z_A) / (1 + k e)$ with $e = a\,m (1 - r\,m) / \max_m m (1 - r\,m)$, $m = 1 - \xi_M$; $1 - z_M$ alike with b and $m = \xi_A$.
 
-    The way back of a smaller loop starts earlier, by e of the range. With k = 0 its end comes earlier too, with k = 1 the
-    end stays where it is. With r = 0 the smallest loop is shifted most, with r = 1 one of half a transformation.
+    The way back of a smaller loop starts earlier, by e of the range, a at most. With k = 0 its end comes earlier too, with k = 1 the
+    end stays where it is. With r = 0 the smallest loop is shifted most, with r = 1 one of half a transformation. So a is what a
+    source tells of minor loops, whichever is shifted most: were it the slope at small m, a prior of one width would say that r is small.
 
     xi_M and xi_A of eq. 3.26 are the fraction at the reversal: 1 and 0 in a full cycle, which this leaves as it is. The
     printed model begins every way back at A_s' or M_s', however little of the wire had transformed.
     """
 
-    heating: Scalar = parameter(
-        "-", -0.8, 4.0, "a: earlier start of heating in a small loop, in transformation ranges", default=0.0
+    heating_shift: Scalar = parameter(
+        "-",
+        -0.8,
+        1.5,
+        "a: earlier start of heating in the loop that is shifted most, in transformation ranges",
+        default=0.0,
     )
-    cooling: Scalar = parameter(
-        "-", -0.8, 4.0, "b: earlier start of cooling in a small loop, in transformation ranges", default=0.0
+    cooling_shift: Scalar = parameter(
+        "-",
+        -0.8,
+        1.5,
+        "b: earlier start of cooling in the loop that is shifted most, in transformation ranges",
+        default=0.0,
     )
     small: Scalar = parameter(
         "-", 0.0, 1.0, "r: how much less the smallest loops are shifted than those of half a stroke", default=0.0
@@ -50,36 +59,41 @@ class MinorLoops(AbstractEffect, RangeTerm):
     candidate: ClassVar[Candidate] = Candidate(
         title="way back in minor loops",
         equation="kinetics",
-        formula="z_A + e (1 - k z_A)/(1 + k e) in eq. 3.3, e = a m (1 - r m), m = 1 - xi_M; 1 - z_M of eq. 3.5 likewise with b and "
-        "m = xi_A (a form chosen here; loops of a usual shape lie within the full one)",
+        formula="z_A + e (1 - k z_A)/(1 + k e) in eq. 3.3, e = a m (1 - r m) over the largest m (1 - r m), m = 1 - xi_M; 1 - z_M of "
+        "eq. 3.5 likewise with b and m = xi_A (a form chosen here; loops of a usual shape lie within the full one)",
         sentence="When a stroke is broken off and turned round, the wire answers sooner than after a full stroke: its small loops "
         "are narrower than the large one.",
-        switches=("heating", "cooling"),
-        initial_guess={"heating": 0.1, "cooling": 0.1, "small": 0.0, "pinned": 0.0},
+        switches=("heating_shift", "cooling_shift"),
+        initial_guess={"heating_shift": 0.1, "cooling_shift": 0.1, "small": 0.5, "pinned": 0.5},
         grid=_grid,
         prior_class="material",
         widths={
-            "heating": Width(
+            "heating_shift": Width(
                 0.3,
                 "minor loops of NiTi wires begin their way back earlier by up to a third of the range",
             ),
-            "cooling": Width(
+            "cooling_shift": Width(
                 0.3,
                 "minor loops of NiTi wires begin their way back earlier by up to a third of the range",
             ),
-            "small": Width(0.5, "any share from 0 to 1"),
-            "pinned": Width(0.5, "any share from 0 to 1"),
+            "small": Width(0.3, "any share from 0 to 1 alike"),
+            "pinned": Width(0.3, "any share from 0 to 1 alike"),
         },
     )
 
     def _earlier(self, size: Scalar, z: Scalar, amplitude: Scalar) -> Scalar:
         """z, from 0 at the start of a range to 1 at its end, in a loop that is `amplitude` of a full one."""
         missing = _missing(amplitude)
-        early = size * missing * (1.0 - self.small * missing)
+        small = self.small
+        # The largest m (1 - r m) of all loops: at m = 1, or at 1/(2 r) where that is within.
+        largest = jnp.where(
+            small > 0.5, 0.25 / jnp.where(small > 0.5, small, 0.5), 1.0 - jnp.where(small > 0.5, 0.0, small)
+        )
+        early = size * missing * (1.0 - small * missing) / largest
         return z + early * (1.0 - self.pinned * z) / (1.0 + self.pinned * early)
 
     def heating_distance(self, law: Kinetics, z: Scalar, temperature: Scalar, stress: Scalar, old: WireState) -> Scalar:
-        return self._earlier(self.heating, z, old.xi_M)
+        return self._earlier(self.heating_shift, z, old.xi_M)
 
     def cooling_distance(self, law: Kinetics, z: Scalar, temperature: Scalar, stress: Scalar, old: WireState) -> Scalar:
-        return 1.0 - self._earlier(self.cooling, 1.0 - z, 1.0 - old.xi_A)
+        return 1.0 - self._earlier(self.cooling_shift, 1.0 - z, 1.0 - old.xi_A)
