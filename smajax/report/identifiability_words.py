@@ -65,7 +65,7 @@ def _determined(checks: Checks) -> Iterator[str]:
         )
     for name in checks.said_by_parameters:
         effect = LIBRARY[name].candidate
-        yield f"{effect.title[0].upper()}{effect.title[1:]}: not named in the end, because the search fits {and_listed(effect.same_as)}, which say the same."
+        yield f"{effect.title[0].upper()}{effect.title[1:]}: not named in the end, because the search fits {and_listed(effect.same_as)}, which {'says' if len(effect.same_as) == 1 else 'say'} the same."
 
 
 def identifiability_sentences(found: Identifiability) -> list[str]:
@@ -141,7 +141,8 @@ def direction_sentence(one: Direction) -> str:
         return f"These runs determine only a combination of {and_listed(list(named))}: none of them is identifiable by itself."
     if len(named) == 1:
         name = next(iter(named))
-        return f"{name} is known to {_size(one, name, 1.0)} only."
+        whole = "" if name in one.temperatures else " of its value"
+        return f"{name} is uncertain: its standard error is {_size(one, name, 1.0)}{whole}."
     changes = and_listed([f"{name} by {_size(one, name, share, '+')}" for name, share in named.items()])
     return f"{and_listed(list(named))} are correlated: a change of {changes} at the same time is one standard error."
 
@@ -149,4 +150,4 @@ def direction_sentence(one: Direction) -> str:
 def _size(one: Direction, name: str, share: float, sign: str = "") -> str:
     """One standard error of `name`, in per cent of its value or in kelvins."""
     unit, whole = ("K", KELVINS) if name in one.temperatures else ("%", 100.0)
-    return f"{whole * one.relative_error * share:{sign}.2g} {unit}"
+    return f"{float(f'{whole * one.relative_error * share:.2g}'):{sign}g} {unit}"

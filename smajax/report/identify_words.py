@@ -183,8 +183,8 @@ def ended_sentence(end: FitEnd) -> str:
     compared = (
         "It is the only fit that was run until its end."
         if end.fits == 1
-        else f"{end.same_cost} of the {end.fits} fits run until their end found the same least cost"
-        f"{'' if end.same_cost == end.fits else ', the others a higher one'}."
+        else f"Of the {end.fits} fits that were run to their end {end.same_cost} ended at the least cost"
+        f"{'' if end.same_cost == end.fits else ', the others at a higher one'}."
     )
     return f"The fit stopped after {end.steps} steps: {reason}. {compared}"
 

@@ -210,7 +210,7 @@ def test_the_step_of_a_temperature_does_not_depend_on_its_zero() -> None:
         assert told is not None
         assert float(told[2]) == pytest.approx(0.2 * float(told[1]), rel=0.06)  # two digits each
     alone = Direction({"start": 1.0}, 0.1, frozenset({"start"}))
-    assert direction_sentence(alone) == "start is known to 2 K only."
+    assert direction_sentence(alone) == "start is uncertain: its standard error is 2 K."
 
 
 def test_the_suggested_run_adds_information(experiment: Experiment, found: Identified) -> None:

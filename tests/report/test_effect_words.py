@@ -76,4 +76,6 @@ def test_the_end_of_a_single_fit_is_compared_with_no_other() -> None:
     end = FitEnd(Status.CONVERGED, 12, 100, 1e-8, fits=1, same_cost=1)
     assert ended_sentence(end).endswith("It is the only fit that was run until its end.")
     both = ended_sentence(dataclasses.replace(end, fits=3, same_cost=2))
-    assert both.endswith("2 of the 3 fits run until their end found the same least cost, the others a higher one.")
+    assert both.endswith(
+        "Of the 3 fits that were run to their end 2 ended at the least cost, the others at a higher one."
+    )

@@ -168,7 +168,7 @@ def of_zeros_so_far(findings: Findings) -> Iterator[str]:
     """That such effects are in the model, and not found."""
     if named := [effect.title for effect in zero_so_far(findings)]:
         yield (
-            f"The likeliest model by then also has {and_listed(named)}, which the numbers so far do not tell from none: "
+            f"The likeliest model by then also has {and_listed(named)}, which by the numbers so far may be zero: "
             f"{'it is' if len(named) == 1 else 'they are'} not named."
         )
 

@@ -17,11 +17,12 @@ def residual_sentences(result: ResidualDiagnostics) -> tuple[str, ...]:
         memory = (
             f"is first-order autoregressive noise with coefficient {result.filter_coefficient:.2f}, and nothing beyond"
         )
-    sentences = [f"The residual is {times_noise(result.ratio, 'the measurement noise')} and {memory}."]
+    whose = "The residual of all outputs together" if len(result.noise_by_output) > 1 else "The residual"
+    sentences = [f"{whose} is {times_noise(result.ratio, 'the measurement noise')} and {memory}."]
     more = [label(name) for name, noise in result.noise_by_output.items() if not noise]
     if more:
         sentences.append(
-            f"That is of all outputs together; by {'itself' if len(more) == 1 else 'themselves'} {and_listed(more)} {'leaves' if len(more) == 1 else 'leave'} more than noise."
+            f"By {'itself' if len(more) == 1 else 'themselves'} {and_listed(more)} {'leaves' if len(more) == 1 else 'leave'} more than noise."
         )
     if result.white or result.filter_coefficient > 0.0:
         return tuple(sentences)
