@@ -66,7 +66,9 @@ def traces_at(
     absent = [effect for effect in among if effect not in present]
     samples = samples_of(joint.problem)
     programs = by_program(absent, looked_for, samples)
-    carried = [compiled_for(joint.ordered((*present, *together)), compiled, samples) for together in programs]
+    # What a program of an earlier search carried may be in the base model since: an input that was recorded wrongly.
+    known = [joint.ordered(one) for one in compiled]
+    carried = [compiled_for(joint.ordered((*present, *together)), known, samples) for together in programs]
     restricted = [joint.restricted(one) for one in carried]
     shared = joint.free([effect for effect in among if effect in present])
     for problems in from_coarse_to_fine([problem for problem, _ in restricted]):

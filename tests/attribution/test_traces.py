@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from smajax.attribution.joint_search import REPLACED, _effects, _neighbours
 from smajax.attribution.laplace_evidence import fitted_model
 from smajax.attribution.subset_evidence import linear_model
@@ -22,3 +24,15 @@ def test_places_of_an_effect_take_no_other_effects_place_among_those_that_are_fi
     assert len([one for one in near if len(one) == 1]) == REPLACED  # each in the place of the latent heat
     assert frozenset({"creep"}) in near
     assert {frozenset({"latent_heat", "creep"}), frozenset({"latent_heat", "sensor_backlash"})} <= set(near)
+
+
+def test_a_program_that_carries_what_is_in_the_base_model_since_is_of_the_others() -> None:
+    """An input that one search called wrong is corrected for the next one, whose candidate it is no longer."""
+    names = ("creep", "latent_heat")
+    search = hot_weight({"creep.martensite": 5e-11}, names)
+    values = search.joint.problem.start_values()
+    present = fitted_model(search.joint, ("latent_heat",), values, ("latent_heat",))
+    plain = traces_at(search.joint, present, search.extent)
+    later = traces_at(search.joint, present, search.extent, compiled=(("input_clock", "creep", "latent_heat"),))
+    assert set(later.columns) == set(plain.columns)
+    np.testing.assert_allclose(later.residual, plain.residual)

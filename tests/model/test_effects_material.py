@@ -227,7 +227,7 @@ def test_residual_strain_and_drift_after_n_cycles_are_those_of_the_formula():
     ends = 2 * each * np.arange(1, n + 1)
     done = 1.0 - np.exp(-np.arange(1, n + 1) / scale)
     np.testing.assert_allclose(run.strain[ends] - plain.strain[ends], most * done, rtol=1e-9)
-    run = simulate_compiled(set_parameters(full, {"drifting_temperatures.heating": shift}), inputs, DT)
+    run = simulate_compiled(set_parameters(full, {"drifting_temperatures.first_heating": shift / scale}), inputs, DT)
     # Half of the wire is austenite at another temperature: later in every cycle by the drift so far.
     for cycle in range(1, n):
         up = slice(2 * each * cycle + 1, 2 * each * cycle + each + 1)
