@@ -9,14 +9,39 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.attribution_benchmark.kinetics import branches
+from studies.attribution_benchmark.kinetics import Branch, branches
 from studies.attribution_benchmark.mechanics import Strains
 from studies.attribution_benchmark.parameters import Effects, Wire
 from studies.attribution_benchmark.runs import Run
 
 Vector = NDArray[np.float64]
 SUBSTEPS = 4
+HALF = 1e-6  # s: nodes that are nearer to each other are one, twice
+MOST_TIMES, SETTLED = (
+    60,
+    1e-13,
+)  # of a fixed point that halves its error at least, as a drift of less than half a range by its own transformation does
 LEVEL = 100e6  # Pa: stress at which widths are as given
+
+
+def _nodes(times: Vector, delay: float) -> Vector:
+    """Times between which the path is straight, `SUBSTEPS` or more a sample, the samples' own among them."""
+    even = np.linspace(times[0], times[-1], (times.size - 1) * SUBSTEPS + 1)
+    turns = times[times + delay < times[-1]] + delay if delay else times[:0]
+    every = np.sort(np.concatenate([even, turns]))
+    # a turn next to a node is that node
+    return every[np.concatenate([[True], np.diff(every) > 2.0 * HALF])]
+
+
+def _left(b: Branch, xi: float, seen: float, stress: float, done: float) -> float:
+    """What the branch has yet to transform at a temperature: a range that drifts has moved by what is transformed up to there, so this is a fixed point."""
+    left = b.left(xi)
+    for _ in range(MOST_TIMES):
+        passed = done + abs(b.left(xi) - left)
+        last, left = left, min(b.left(xi), max(b.amplitude * b.curve.at(b.progress(seen, stress, passed)[0])[0], 0.0))
+        if not b.drift or abs(left - last) < SETTLED:
+            break
+    return left
 
 
 def strain(wire: Wire, times: Vector, run: Run, effects: Effects) -> Vector:
@@ -26,15 +51,15 @@ def strain(wire: Wire, times: Vector, run: Run, effects: Effects) -> Vector:
     stress = float(run.other[0]) * (1 + effects.get("wrong_load", 0.0))
     strains, lag = Strains(wire, effects), effects.get("rate_dependence", 0.0)
     pair = branches(wire, effects, LEVEL)
-    fine = np.linspace(times[0], times[-1], (times.size - 1) * SUBSTEPS + 1)
-    # the oven is read at `times`; a delay means that the wire is behind it
-    path = np.interp(fine - effects.get("input_delay", 0.0), times, run.command)
-    step = float(fine[1] - fine[0])
+    # the oven is read at `times`; a delay means that the wire is behind it, and turns between two of them
+    delay = effects.get("input_delay", 0.0)
+    fine = _nodes(times, delay)
+    path = np.interp(fine - delay, times, run.command)
     xi, done, late = 1.0, 0.0, float(path[0])
     total, creep, kept = 0.0, strains.creep * stress / strains.level, np.zeros(fine.size)
     seen = late
     for k in range(1, fine.size):
-        change = float(path[k] - path[k - 1])
+        change, step = float(path[k] - path[k - 1]), float(fine[k] - fine[k - 1])
         if lag:
             ramp, decay = change / step, float(np.exp(-step / lag))
             seen = float(path[k]) - ramp * lag + (late - float(path[k - 1]) + ramp * lag) * decay
@@ -44,8 +69,7 @@ def strain(wire: Wire, times: Vector, run: Run, effects: Effects) -> Vector:
         old = xi
         for b in pair:
             if b.sign == sign and b.left(xi) > 0:
-                z = b.progress(seen, stress, done)[0]
-                left = min(b.left(xi), max(b.amplitude * b.curve.at(z)[0], 0.0))
+                left = _left(b, xi, seen, stress, done)
                 if left < b.left(xi):
                     xi = b.left(left)
                     pair[b.sign > 0].renew(seen, stress, done, xi)
@@ -59,4 +83,4 @@ def strain(wire: Wire, times: Vector, run: Run, effects: Effects) -> Vector:
             creep += rate * step
             total += rate * step
         late, kept[k] = seen, total
-    return kept[::SUBSTEPS]
+    return kept[np.searchsorted(fine, times - HALF)]

@@ -83,6 +83,7 @@ EFFECTS: dict[str, Effect] = {
     "convection_regime": Effect("heat", 0.05, 1.0, "share added to the convection's slope above 45 K", outside=True),
     "clamp_node": Effect("heat", 0.02, 1.0, "coupling to a clamp of 12 s, of the convection"),
     "drive_saturation": Effect("electrical", 0.2, 2.0, "c of v/sqrt(1 + (c v/v_max)^2)"),
+    "resistance_peak": Effect("electrical", 0.02, 0.6, "of the resistance at 60 C, 8 K wide: an R-phase", outside=True),
     "bumped_transformation": Effect("kinetics", 0.3, 3.0, "c of c sin^2(pi z) sin(4 pi z)/(4 pi)", outside=True),
     "quadratic_strain": Effect("constitutive", 0.02, 0.9, "eps_L [1 + c (2 xi - 1)] per fraction", outside=True),
     "cogging": Effect("mechanics", 0.05, 1.0, "of the load at rest, period 7 % of the stroke", outside=True),

@@ -17,6 +17,7 @@ POWER_AT, POWER_FROM = (
 CLAMP_TIME = 12.0  # s
 SAG_TIME = 4.0  # s
 PWM_SUPPLY = 2.0  # supply's volts over the largest command of all runs
+PEAK_AT, PEAK_WIDTH = 60.0, 8.0  # C and K of the peak of the resistance
 
 
 class Heat:
@@ -74,6 +75,7 @@ class Electricity:
         self.austenite = wire.resistivity_austenite / wire.area * (1 + get("phase_resistance", 0.0))
         self.martensite = wire.resistivity_martensite / wire.area
         self.by_temperature, self.ambient = get("temperature_resistance", 0.0), wire.ambient_temperature
+        self.peak = get("resistance_peak", 0.0)
         cold = self.martensite * wire.wire_length
         self.lead = get("lead_resistance", 0.0) * cold
         self.sag = get("supply_sag", 0.0) * cold
@@ -97,6 +99,8 @@ class Electricity:
                 share += self.pwm * (self.supply / value - 1) if value else 0.0
         metre = self.austenite + xi * (self.martensite - self.austenite)
         metre *= 1 + self.by_temperature * (temperature - self.ambient)
+        if self.peak:
+            metre *= 1 + self.peak * math.exp(-(((temperature - PEAK_AT) / PEAK_WIDTH) ** 2))
         whole = metre * self.length
         current = max(volts - self.sag * sag, 0.0) / (whole + self.lead)
         return current * current * metre * share, current * share

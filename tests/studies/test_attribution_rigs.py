@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from studies.attribution_benchmark import coupon
 from studies.attribution_benchmark.actuator import Actuator
 from studies.attribution_benchmark.cases import Case, cases, true_wire, truth
 from studies.attribution_benchmark.effects import EFFECTS, absorbed, applies
@@ -229,3 +230,18 @@ def test_states_are_only_those_that_the_effects_need() -> None:
     plain = Actuator(rig.wire, rig.load(0.0), {"coulomb_friction": 0.0}, 10.0, 7.0, 1e8)
     assert "friction" not in plain.names
     assert "friction" in Actuator(rig.wire, rig.load(0.0), {"coulomb_friction": 0.1}, 10.0, 7.0, 1e8).names
+
+
+@pytest.mark.parametrize("effects", [{"transformation_drift": 2.0}, {"input_delay": 0.6}])
+def test_a_coupons_strain_does_not_depend_on_how_finely_it_is_summed(
+    effects: dict[str, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A drift counts what is transformed up to now, and a delayed oven turns between two samples: with four parts a sample both were off by several noises."""
+    rig = RIGS["coupon"]
+    (run,) = (one for one in rig.runs(rig.wire) if one.name == "inner")
+    shown = []
+    for parts in (4, 32):
+        monkeypatch.setattr(coupon, "SUBSTEPS", parts)
+        shown.append(coupon.strain(rig.wire, rig.clock.times, run, effects))
+    assert np.abs(shown[0] - shown[1]).max() < rig.noise
+    assert np.sqrt(np.mean((shown[0] - shown[1]) ** 2)) < 0.1 * rig.noise
