@@ -12,6 +12,7 @@ from smajax.attribution.findings import CoefficientFinding, EffectFinding, Param
 from smajax.attribution.fit_programs import Effects
 from smajax.attribution.job import Job
 from smajax.attribution.joint_parameters import JointParameters
+from smajax.attribution.laplace_evidence import square_of_slope
 from smajax.attribution.leave_one_run_out import jackknife_error
 from smajax.attribution.model_fits import Evidence, Model, Search
 from smajax.attribution.nuisance_grid import scores_at
@@ -53,6 +54,7 @@ def parameters_found(job: Job, setting: Search, model: Model, start: np.ndarray,
     problem = own.with_system(own.system, priors=priors).with_noise(error)
     at: Sensitivity = sensitivity(problem, model.values[slots], names)
     values = {name: float(model.values[index(name)]) for name in names}
+    at = replace(at, jacobian=at.jacobian / np.sqrt(square_of_slope(model.effects)))
     known = uncertainty(at, names, values, job.bounds)
     table = parameters(job.problem.system)
     units = {name: entry.unit for name, entry in table.items()}

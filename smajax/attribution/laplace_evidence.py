@@ -21,6 +21,7 @@ import scipy  # its parts are imported when they are first used
 
 from smajax.attribution.joint_parameters import JointParameters, residual_and_columns
 from smajax.core.whiteness import correlation_time, on_samples, split_runs
+from smajax.model.effects.library import LIBRARY
 
 ROUNDING = 1e-14  # of an eigenvalue of a matrix whose diagonal is one
 LONGEST = 50.0  # samples: beyond it the correlation of a residual is its own shape, and no property of a noise
@@ -112,7 +113,7 @@ def fitted_model(
         names=tuple(names),
         scales=scales,
         squares=float(residual @ residual),
-        gram=matrix.T @ matrix,
+        gram=matrix.T @ matrix / square_of_slope(effects),
         precision=precision,
         width_factors=factors,
         log_prior=log_prior,
@@ -121,6 +122,11 @@ def fitted_model(
         rms=float(np.sqrt(np.mean(residual**2))),
         correlation=correlation,
     )
+
+
+def square_of_slope(effects: Sequence[str]) -> float:
+    """By how much derivatives of a model with `effects` tell too much (`Candidate.square_of_slope`)."""
+    return max((LIBRARY[one].candidate.square_of_slope for one in effects if one in LIBRARY), default=1.0)
 
 
 def width_factor(deviations: np.ndarray) -> float:

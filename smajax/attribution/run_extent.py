@@ -43,11 +43,15 @@ def _whole_way(problem: Problem, lowest: float, highest: float) -> tuple[float, 
     return start, start + float(load.travel(wire, wire.constitutive.recoverable_strain))
 
 
-def _largest_command(problem: Problem) -> float:
-    """Of the drive's channel while the runs are measured, in its unit; 0 without a drive."""
+def _commands(problem: Problem) -> tuple[float, int]:
+    """(the largest of the drive's channel while the runs are measured, in its unit, how many sizes it has beside zero, to a hundredth of that); zeros without a drive."""
     batch = problem.batch
-    channels = [np.asarray(batch.inputs[name]) for name in problem.system.drive.inputs_required]
-    return max((float(np.abs(one[batch.measured]).max()) for one in channels), default=0.0)
+    channels = [np.abs(np.asarray(batch.inputs[name])[batch.measured]) for name in problem.system.drive.inputs_required]
+    largest = max((float(one.max()) for one in channels), default=0.0)
+    if not largest > 0.0:
+        return 0.0, 0
+    sizes = np.unique(np.round(np.concatenate(channels) / largest, 2))
+    return largest, int((sizes > 0.0).sum())
 
 
 def extent_of(problem: Problem) -> Extent:
@@ -67,4 +71,6 @@ def extent_of(problem: Problem) -> Extent:
     seen = batch.measured
     samples = seen.shape[1] - np.argmax(seen[:, ::-1], axis=1)  # to the last measured one
     seconds = float(np.median(samples) * batch.dt)
-    return Extent(seconds, stroke, increment, lowest, highest, one_force, _largest_command(problem))
+    largest, sizes = _commands(problem)
+    sigma = float(np.median(noise))
+    return Extent(seconds, stroke, increment, lowest, highest, one_force, largest, sigma, sizes)

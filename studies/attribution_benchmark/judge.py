@@ -10,6 +10,7 @@ from typing import Any
 
 from smajax.core.files import replace
 from smajax.model.effects.library import LIBRARY
+from studies.attribution_benchmark.effects import EFFECTS
 
 # What the library calls the generator's effects, where it calls them otherwise. Neither was written with the other in
 # view; some of the library's forms were widened after cases that it missed (README.md). The generator's smooth transformation, a share of the wire over a wider range, is the library's of two parts. The curve of the transformation has all their shapes.
@@ -145,7 +146,10 @@ def equations_of(truth: Mapping[str, Any]) -> tuple[str, ...]:
 def kind_of(truth: Mapping[str, Any]) -> str:
     """The kind of case: what the library does not hold is outside, whatever the generator thinks."""
     held = all(set(called(name)) & set(LIBRARY) for name in names_of(truth))
-    foreign = not held or any(entry["outside"] for entry in truth["effects"].values())
+    # By the library of today, not by that of the day on which the case was written.
+    foreign = not held or any(
+        EFFECTS[name].outside if name in EFFECTS else entry["outside"] for name, entry in truth["effects"].items()
+    )
     return "outside" if foreign and truth["kind"] != "absorbed" else str(truth["kind"])
 
 

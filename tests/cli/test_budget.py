@@ -180,6 +180,21 @@ def test_a_time_that_is_over_shows_what_an_earlier_run_of_the_same_experiment_kn
     assert "before this run knew more than the earlier one, of which that is; the same command resumes" in ended.said
 
 
+def test_a_page_that_was_deleted_to_be_written_anew_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    report = tmp_path / "report"
+    report.mkdir()
+    (report / "report.json").write_text("{}", encoding="utf-8")
+
+    def overwrites(seconds: float, words: list[str]) -> None:
+        (report / "report.json").unlink()
+        (report / ".smajax.json").write_text("{}", encoding="utf-8")
+
+    monkeypatch.setattr("smajax.cli.budget.run_within", overwrites)
+    ended = smajax("close-loop", "mine.toml", "--out", str(report), "--overwrite", "--budget", "1s")
+    assert ended.code == 3
+    assert "there is no page, and nothing was finished" in ended.said
+
+
 def test_a_command_that_ends_in_time_is_as_without_a_budget() -> None:
     assert run_within(60.0, ["--version"]) == 0
     assert run_within(60.0, ["close-loop", "none.toml"]) == 2

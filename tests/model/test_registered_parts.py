@@ -168,7 +168,7 @@ def test_a_load_states_the_sources_of_its_numbers() -> None:
         ({"widths": {"enthalpy": Width(0.0, "")}}, "for enthalpy; expected a sigma above 0"),
         (
             {"widths": {"enthalpy": Width(1.0, "", of="hour")}},  # type: ignore[arg-type]
-            "'stroke', 'increment', 'run', 'load', '1/run', 'stroke/run'",
+            "'stroke', 'increment', 'run', 'load', 'command', '1/run', 'stroke/run'",
         ),
     ],
 )

@@ -9,6 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from smajax.attribution.laplace_evidence import square_of_slope
+from smajax.model.effects.candidate import Extent
 from smajax.model.effects.sensor_resolution import SensorResolution
 
 INCREMENT, ZERO = 2e-3, 3e-4
@@ -38,6 +40,20 @@ def test_over_a_level_its_derivatives_are_those_of_the_mean() -> None:
     # Beyond a quarter of the level from an edge nothing is told: a motion within it leaves the reading as it is.
     assert by_x[0] > 5.0
     assert by_x[50:150].max() < 0.03
+
+
+def test_the_mean_square_of_the_slope_is_what_evidence_and_standard_errors_are_divided_by() -> None:
+    by_x = np.asarray(jax.vmap(jax.grad(_shown))(ONE_CELL))
+    assert np.mean(by_x**2) == pytest.approx(SensorResolution.candidate.square_of_slope, rel=1e-6)
+    assert square_of_slope(("latent_heat", "sensor_resolution")) == SensorResolution.candidate.square_of_slope
+    assert square_of_slope(("latent_heat", "a term of its own")) == 1.0
+
+
+def test_a_stair_within_the_noise_is_not_looked_for() -> None:
+    observable = SensorResolution.candidate.observable
+    assert observable(Extent(20.0, 0.02, 1e-3, noise=2e-4))
+    assert not observable(Extent(20.0, 0.02, 1e-3, noise=5e-4))
+    assert not observable(Extent(20.0, 0.02, 0.0, noise=0.0))
 
 
 @pytest.mark.parametrize("start", [0.93, 1.06])

@@ -105,9 +105,9 @@ def _gains_as_of_noise(score: Score, squares: float) -> bool:
 
 
 def _best_of_each(scores: Sequence[Score], count: int, squares: float) -> list[Score]:
-    """The best of each equation first, then the others by gain; `count` of them without those that gain as of noise, or the best alone if any gains anything.
+    """The best of each equation, then the others by gain, `count` of them, without those that gain as of noise; the best alone if all gain so little.
 
-    Beside them those of an equation that gain nearly as much as its best: about the base model a change of the command and one of the resistance look much
+    Beside these `count` those of an equation that gain nearly as much as its best: about the base model a change of the command and one of the resistance look much
     the same, and fitted only one of them comes to the noise. `squares`: as of `_gains_as_of_noise`.
     """
     firsts: dict[str, Score] = {}

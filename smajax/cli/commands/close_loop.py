@@ -108,9 +108,10 @@ def _within(seconds: float, out: Path, json_out: bool) -> None:
     if code is not None:
         raise typer.Exit(code)
     resumes = "the same command resumes from the finished fits"
-    anew = _written(shown) != before
+    now = _written(shown)  # none where --overwrite has deleted it
+    anew = now is not None and now != before
     # A folder is claimed for one experiment: the page that was in it is of an earlier run of the same.
-    same = before is not None and _written(mark) != claimed_before
+    same = now is not None and _written(mark) != claimed_before
     if not anew and not same:
         page = f"the page in {out} is of an earlier run" if shown.is_file() else "there is no page"
         if not any(out.glob(FITS)):

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -101,15 +100,31 @@ def _variation(several: Sequence[str] | None, plant: System) -> dict[str, float]
     return variation
 
 
-def _higher_limit(reach: Reach, plant: System, settings: TuneSettings) -> dict[str, float]:
-    """The drive's limit for what limits the controller's command, where the preset's is lower and too low for a set point; none where it is given."""
-    from smajax.control.reach import out_of_reach
+LARGER = 1.1  # limits that are tried, each over the one before
 
-    limit = float(plant.drive.largest_command())
-    if reach.by_drive or not math.isfinite(limit) or set(reach.parameters) & set(settings.fixed):
-        return {}
+
+def _higher_limit(
+    reach: Reach, plant: System, settings: TuneSettings, reach_with: Callable[[dict[str, float]], Reach | None]
+) -> dict[str, float]:
+    """A higher limit of the controller's command, with as much above what the set points need as presets have; none where the drive's is lower or not known.
+
+    None either where the limit is given: by the gains that the tuning starts from, or fixed.
+    """
+    from smajax.control.reach import out_of_reach
+    from smajax.control.scales import HEADROOM, limited_as
+
+    known = limited_as(plant)
     too_high = any(one > reach.high for one in out_of_reach(reach, plant, settings.set_points))
-    return dict.fromkeys(reach.parameters, limit) if too_high else {}
+    if known is None or reach.by_drive or settings.start or set(reach.parameters) & set(settings.fixed) or not too_high:
+        return {}
+    of_drive, limit = float(known), LARGER * reach.command
+    # From below: of a wire that is far too hot expansion takes the stroke away again.
+    while limit < LARGER * of_drive:
+        with_it = reach_with(dict.fromkeys(reach.parameters, min(limit, of_drive)))
+        if with_it is not None and not out_of_reach(with_it, plant, settings.set_points):
+            return dict.fromkeys(reach.parameters, min(HEADROOM * limit, of_drive))
+        limit *= LARGER
+    return {}
 
 
 def _said_of_limit(reach: Reach, settings: TuneSettings, limit: float) -> str:
@@ -118,7 +133,7 @@ def _said_of_limit(reach: Reach, settings: TuneSettings, limit: float) -> str:
     own, largest = (f"{digits(one, 4)} {reach.unit.command}" for one in (reach.command, limit))
     return (
         f"The preset of {settings.controller} gives up to {own} on this plant, with which the load comes to rest below "
-        f"{max(settings.set_points):g} {reach.unit.shown}: here it may give what the drive can, {largest}."
+        f"{max(settings.set_points):g} {reach.unit.shown}: here it may give up to {largest}."
     )
 
 
@@ -148,12 +163,16 @@ def _run(
     request = {"tuning": settings.controller}  # the other settings are in a file of the tuning itself, which it checks
     try:
         settings.check(plant, plants)
-        made = replace(CONTROLLERS[settings.controller], fixed=settings.fixed).make(plant)
-        reach = reach_of(plant, made)
-        if typed and reach is not None and (higher := _higher_limit(reach, plant, settings)):
+
+        def reach_with(fixed: Mapping[str, float]) -> Reach | None:
+            own = {**settings.fixed, **fixed}
+            return reach_of(plant, replace(CONTROLLERS[settings.controller], fixed=own).make(plant))
+
+        reach = reach_with({})
+        if typed and reach is not None and (higher := _higher_limit(reach, plant, settings, reach_with)):
             typer.echo(_said_of_limit(reach, settings, next(iter(higher.values()))), err=True)
+            reach = reach_with(higher)
             settings = replace(settings, fixed={**settings.fixed, **higher})
-            reach = reach_of(plant, replace(CONTROLLERS[settings.controller], fixed=settings.fixed).make(plant))
         beyond = () if typed else out_of_reach(reach, plant, settings.set_points)
         if reach is not None and 0 < len(beyond) < len(settings.set_points):
             left = tuple(one for one in settings.set_points if one not in beyond)

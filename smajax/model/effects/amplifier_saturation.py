@@ -12,10 +12,16 @@ from smajax.model.effects.base import AbstractEffect
 from smajax.model.effects.candidate import Actuator, Candidate, Extent, Width
 from smajax.model.types import Scalar
 
+SIZES = (
+    3  # of commands, beside zero: what is lost of one or two is a gain, which convection and heat capacity say as well
+)
 AT, SOFT = (
     (0.5, 0.7, 0.85),
     (1.0, 0.1, 0.1),
 )  # knees that are tried: shares of the largest command, and how soft each is
+
+
+LIMITS = (1e-4, 1e5)
 
 
 def _applies(system: Actuator) -> bool:
@@ -23,22 +29,17 @@ def _applies(system: Actuator) -> bool:
 
 
 def _observable(extent: Extent) -> bool:
-    return extent.command > 0.0
+    return extent.command_sizes >= SIZES
 
 
 def _bounds(extent: Extent) -> dict[str, tuple[float, float]]:
     # Beyond the largest command nothing is lost, and far below it all is a gain.
-    return {"limit": (0.1 * extent.command, 1.2 * extent.command)} if extent.command > 0.0 else {}
+    low, high = (min(max(share * extent.command, LIMITS[0]), LIMITS[1]) for share in (0.1, 1.2))
+    return {"limit": (low, high)} if low < high else {}
 
 
 def _grid(extent: Extent) -> tuple[dict[str, float], ...]:
     return tuple({"limit": share * extent.command, "softness": soft} for share, soft in zip(AT, SOFT, strict=True))
-
-
-def _beyond(size: Scalar, limit: Scalar, softness: Scalar) -> Scalar:
-    """How far a command is beyond the limit, rounded over `softness` of it: half a hyperbola."""
-    over = size - limit
-    return 0.5 * (over + jnp.sqrt(over * over + (softness * limit) ** 2))
 
 
 class AmplifierSaturation(AbstractEffect, CommandTerm):
@@ -49,9 +50,9 @@ class AmplifierSaturation(AbstractEffect, CommandTerm):
 
     lost: Scalar = parameter("-", 0.0, 1.0, "r: share of the command beyond the limit that is lost", default=0.0)
     limit: Scalar = parameter(
-        "-", 1e-3, 1e3, "L: limit, a number of V, A, W or duty as the drive's channel is", default=1.0
+        "-", *LIMITS, "L: limit, a number of V, A, W or duty as the drive's channel is", default=1.0
     )
-    softness: Scalar = parameter("-", 0.01, 3.0, "w: how soft the knee is, over the limit", default=0.1)
+    softness: Scalar = parameter("-", 0.01, 1.5, "w: how soft the knee is, over the limit", default=0.1)
 
     effect_name: ClassVar[str] = "amplifier_saturation"
     candidate: ClassVar[Candidate] = Candidate(
@@ -81,6 +82,7 @@ class AmplifierSaturation(AbstractEffect, CommandTerm):
     )
 
     def command(self, channel: str, value: Scalar) -> Scalar:
-        size = jnp.abs(value)
-        beyond, at_rest = (_beyond(one, self.limit, self.softness) for one in (size, jnp.zeros_like(size)))
-        return jnp.sign(value) * (size - self.lost * (beyond - at_rest))
+        # [e(|u|) - e(0)]/|u| in a form that has its value and slope at zero.
+        size, knee = jnp.abs(value), self.softness * self.limit
+        far, near = (jnp.sqrt((one - self.limit) ** 2 + knee**2) for one in (size, 0.0))
+        return value * (1.0 - 0.5 * self.lost * (1.0 + (size - 2.0 * self.limit) / (far + near)))

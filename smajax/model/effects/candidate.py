@@ -47,6 +47,8 @@ class Extent(NamedTuple):
     highest: float = 0.0  # reading of all, SI; as `lowest`: not known
     one_force: bool = False  # whether the load pulls with the same force in all runs, wherever it is
     command: float = 0.0  # largest of the drive's channel in all runs, SI; 0 without a drive
+    noise: float = 0.0  # of a reading, SI
+    command_sizes: int = 0  # how many sizes of it there are beside zero, to a hundredth of the largest
 
 
 def several_forces(extent: Extent) -> bool:
@@ -139,6 +141,8 @@ class Candidate:
     # Whether its priors take part in the fit whose values are reported as well: they say how smooth a shape is, which the runs alone
     # do not determine.
     keeps_priors: bool = False
+    # Mean square of a slope that stands in for one which is zero nearly everywhere, as of a staircase: by so much derivatives through it tell too much.
+    square_of_slope: float = 1.0
     # Whether it can change anything of this wire, load and drive: a candidate that cannot is not looked at.
     applies: Callable[[Actuator], bool] = _always
     # Whether runs of that extent could show it: a candidate that they cannot is not looked at.

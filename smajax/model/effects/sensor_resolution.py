@@ -15,12 +15,16 @@ from smajax.model.sensor_reading import SensorTerm
 from smajax.model.types import Scalar
 
 PHASES = 12
+COARSE = 3.0  # noises
 SHARPNESS = 8  # half the power of the sine
-STEEPEST = 4.0**SHARPNESS / math.comb(2 * SHARPNESS, SHARPNESS)  # with which the mean slope is one
+_MIDDLE = math.comb(2 * SHARPNESS, SHARPNESS)
+STEEPEST = 4.0**SHARPNESS / _MIDDLE  # with which the mean slope is one
+SQUARE = math.comb(4 * SHARPNESS, 2 * SHARPNESS) / _MIDDLE**2  # mean of its square then
 
 
 def _observable(extent: Extent) -> bool:
-    return extent.increment > 0.0
+    # A finer stair is within the noise, and its edges, by which a fit goes, are not to be seen in it.
+    return extent.increment > COARSE * extent.noise
 
 
 def _grid(extent: Extent) -> tuple[dict[str, float], ...]:
@@ -34,7 +38,8 @@ class SensorResolution(AbstractEffect, SensorTerm):
 
     The stair's own derivative is zero wherever it is flat, and would tell a fit nothing of when the motion goes from one level to the next. In its place is
     $5.09 \sin^{16}(\pi u)$, $u = (x - z)/q$, of mean one: a sample weighs the more the nearer it is to an edge. With $2 \sin^2(\pi u)$ a fit
-    holds back for samples between edges, which a motion within a level leaves as they are, and more of them end on the wrong side of an edge.
+    holds back for samples between edges, which a motion within a level leaves as they are, and more of them end on the wrong side of an edge. Standard errors
+    and evidence are those of a sensor without a stair (`Candidate.square_of_slope`); a coarse stair tells less than that.
     """
 
     share: Scalar = parameter("-", 0.0, 1.0, "s: share of the staircase in the reading", default=0.0)
@@ -59,6 +64,7 @@ class SensorResolution(AbstractEffect, SensorTerm):
         switches=("share",),
         initial_guess={"share": 0.9, "increment": 1e-3, "zero": 0.0},
         observable=_observable,
+        square_of_slope=SQUARE,
         grid=_grid,
         prior_class="bench",
         widths={
