@@ -150,7 +150,9 @@ def kind_of(truth: Mapping[str, Any]) -> str:
     foreign = not held or any(
         EFFECTS[name].outside if name in EFFECTS else entry["outside"] for name, entry in truth["effects"].items()
     )
-    return "outside" if foreign and truth["kind"] != "absorbed" else str(truth["kind"])
+    if truth["kind"] == "absorbed":
+        return "absorbed"
+    return "outside" if foreign else ("null", "single", "pair", "triple")[len(truth["effects"])]
 
 
 def judge(truth: Mapping[str, Any], report: Mapping[str, Any], seconds: float) -> Judged:

@@ -105,6 +105,9 @@ def test_each_kind_has_its_right_answer() -> None:
     # The library has its heat balance by another name.
     clamp = judge(_truth("single", {"clamp_node": "heat"}), _report("explained", ["warmed_surroundings"]), 1.0)
     assert (clamp.kind, clamp.right) == ("single", True)
+    # Also of a case that was written when the library had not got it.
+    old = _truth("outside", {"clamp_node": "heat"}, outside=True)
+    assert judge(old, _report("explained", ["warmed_surroundings"]), 1.0).kind == "single"
     # What the library does not hold is outside of it, whatever the generator calls it.
     assert judge(_truth("single", {"cogging": "mechanics"}), _report("adequate", []), 1.0).kind == "outside"
 
