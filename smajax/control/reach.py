@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
 import jax.numpy as jnp
@@ -12,7 +12,7 @@ import numpy as np
 from smajax.control.controllers.base import AbstractController, limits_of
 from smajax.control.load_equation import moving_load, stroke_of
 from smajax.control.position_unit import SHARES, PositionUnit, band_shown, unit_of
-from smajax.control.scales import seconds_for
+from smajax.control.scales import HEADROOM, limited_as, seconds_for
 from smajax.core.display_units import digits
 from smajax.core.parameters import parameters
 from smajax.model.system import System
@@ -21,6 +21,7 @@ from smajax.simulation.compiled import simulate_compiled
 STEP = 0.02  # s
 LONGER = 2.0  # times a closed loop's length, in which the wire comes to rest
 AT_REST = 0.2  # of the run, at its end
+LARGER = 1.1  # limits of a command that are tried, each over the one before
 TOLERANCE = 1e-3  # of a step: enough for a reach that is said to three digits
 
 
@@ -92,6 +93,30 @@ def out_of_reach(reach: Reach | None, system: System, set_points: Sequence[float
         return []
     near = band_shown(system)
     return [point for point in set_points if not reach.low - near <= point <= reach.high + near]
+
+
+def higher_limit(
+    reach: Reach,
+    system: System,
+    set_points: Sequence[float],
+    reach_with: Callable[[dict[str, float]], Reach | None],
+) -> dict[str, float]:
+    """A higher limit of a controller's command, with as much above what the set points need as presets have; by its parameters, in the drive's unit.
+
+    `reach_with`: the reach with values of these. Empty where the set points are in reach, or the drive's limit is lower or not known.
+    """
+    known = limited_as(system)
+    too_high = any(one > reach.high for one in out_of_reach(reach, system, set_points))
+    if known is None or reach.by_drive or not too_high:
+        return {}
+    of_drive, limit = float(known), LARGER * reach.command
+    # From below: of a wire that is far too hot expansion takes the stroke away again.
+    while limit < LARGER * of_drive:
+        with_it = reach_with(dict.fromkeys(reach.parameters, min(limit, of_drive)))
+        if with_it is not None and not out_of_reach(with_it, system, set_points):
+            return dict.fromkeys(reach.parameters, min(HEADROOM * limit, of_drive))
+        limit *= LARGER
+    return {}
 
 
 def reach_sentence(reach: Reach | None, system: System, set_points: Sequence[float]) -> str:

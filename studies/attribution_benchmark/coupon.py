@@ -16,11 +16,9 @@ from studies.attribution_benchmark.runs import Run
 
 Vector = NDArray[np.float64]
 SUBSTEPS = 4
-HALF = 1e-6  # s: nodes that are nearer to each other are one, twice
-MOST_TIMES, SETTLED = (
-    60,
-    1e-13,
-)  # of a fixed point that halves its error at least, as a drift of less than half a range by its own transformation does
+NEAR = 1e-6  # s: nodes that are nearer to each other are one
+# Of a fixed point, which halves its error at least: a drift by its own transformation is less than half a range.
+MOST_TIMES, SETTLED = 60, 1e-13
 LEVEL = 100e6  # Pa: stress at which widths are as given
 
 
@@ -30,7 +28,7 @@ def _nodes(times: Vector, delay: float) -> Vector:
     turns = times[times + delay < times[-1]] + delay if delay else times[:0]
     every = np.sort(np.concatenate([even, turns]))
     # a turn next to a node is that node
-    return every[np.concatenate([[True], np.diff(every) > 2.0 * HALF])]
+    return every[np.concatenate([[True], np.diff(every) > NEAR])]
 
 
 def _left(b: Branch, xi: float, seen: float, stress: float, done: float) -> float:
@@ -83,4 +81,4 @@ def strain(wire: Wire, times: Vector, run: Run, effects: Effects) -> Vector:
             creep += rate * step
             total += rate * step
         late, kept[k] = seen, total
-    return kept[np.searchsorted(fine, times - HALF)]
+    return kept[np.searchsorted(fine, times - NEAR)]

@@ -206,8 +206,8 @@ def _learnt(
     misfit = misfits(problem, [model.values])[0]
     samples = float(mask.sum()) / correlation_time(split_runs(misfit, mask))
     system = search.problem.system
-    units = {"reading": system.load.reading[1]}
-    units |= dict.fromkeys(["command"], next((INPUT_UNITS[one] for one in system.drive.inputs_required), "-"))
+    command = next((INPUT_UNITS[one] for one in system.drive.inputs_required), "-")
+    units = {"reading": system.load.reading[1], "command": command}
     state_unit, unit = (units.get(one, one) for one in (term.state_unit, term.unit))
     return UnknownTerm(
         name=term.effect_name,

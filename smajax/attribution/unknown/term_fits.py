@@ -56,9 +56,9 @@ def with_terms(
     """
     # Where the runs go and how many tries they take is asked of the final model alone, whose program is there.
     alone, index = setting.restricted(final.effects)
-    own_place = final.values[index]
-    found = sought(alone.system_at(jnp.asarray(own_place)), alone.with_own_values(own_place))
-    integration = limited_near(alone, own_place)
+    there = final.values[index]
+    found = sought(alone.system_at(jnp.asarray(there)), alone.with_own_values(there))
+    integration = limited_near(alone, there)
     plain, index = setting.restricted((*final.effects, *carried))
     system = plain.system_at(jnp.asarray(final.values[index]))
     names = tuple(term.effect_name for term in found.terms)

@@ -100,31 +100,14 @@ def _variation(several: Sequence[str] | None, plant: System) -> dict[str, float]
     return variation
 
 
-LARGER = 1.1  # limits that are tried, each over the one before
-
-
 def _higher_limit(
     reach: Reach, plant: System, settings: TuneSettings, reach_with: Callable[[dict[str, float]], Reach | None]
 ) -> dict[str, float]:
-    """A higher limit of the controller's command, with as much above what the set points need as presets have; none where the drive's is lower or not known.
+    """`higher_limit`; none where a limit is given, fixed or by the gains that the tuning starts from."""
+    from smajax.control.reach import higher_limit
 
-    None either where the limit is given: by the gains that the tuning starts from, or fixed.
-    """
-    from smajax.control.reach import out_of_reach
-    from smajax.control.scales import HEADROOM, limited_as
-
-    known = limited_as(plant)
-    too_high = any(one > reach.high for one in out_of_reach(reach, plant, settings.set_points))
-    if known is None or reach.by_drive or settings.start or set(reach.parameters) & set(settings.fixed) or not too_high:
-        return {}
-    of_drive, limit = float(known), LARGER * reach.command
-    # From below: of a wire that is far too hot expansion takes the stroke away again.
-    while limit < LARGER * of_drive:
-        with_it = reach_with(dict.fromkeys(reach.parameters, min(limit, of_drive)))
-        if with_it is not None and not out_of_reach(with_it, plant, settings.set_points):
-            return dict.fromkeys(reach.parameters, min(HEADROOM * limit, of_drive))
-        limit *= LARGER
-    return {}
+    given = settings.start or set(reach.parameters) & set(settings.fixed)
+    return {} if given else higher_limit(reach, plant, settings.set_points, reach_with)
 
 
 def _said_of_limit(reach: Reach, settings: TuneSettings, limit: float) -> str:

@@ -9,23 +9,14 @@ import jax.numpy as jnp
 from smajax.core.parameters import parameter
 from smajax.model.drive.inputs import CommandTerm
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Actuator, Candidate, Extent, Width
+from smajax.model.effects.candidate import Candidate, Extent, Width, has_command
 from smajax.model.types import Scalar
 
-SIZES = (
-    3  # of commands, beside zero: what is lost of one or two is a gain, which convection and heat capacity say as well
-)
-AT, SOFT = (
-    (0.5, 0.7, 0.85),
-    (1.0, 0.1, 0.1),
-)  # knees that are tried: shares of the largest command, and how soft each is
-
-
+# Sizes of commands, beside zero: what is lost of one or two is a gain, which convection and heat capacity say as well.
+SIZES = 3
+# Knees that are tried: where, in shares of the largest command, and how soft.
+KNEES = (0.5, 1.0), (0.7, 0.1), (0.85, 0.1)
 LIMITS = (1e-4, 1e5)
-
-
-def _applies(system: Actuator) -> bool:
-    return bool(system.drive.inputs_required)
 
 
 def _observable(extent: Extent) -> bool:
@@ -39,7 +30,7 @@ def _bounds(extent: Extent) -> dict[str, tuple[float, float]]:
 
 
 def _grid(extent: Extent) -> tuple[dict[str, float], ...]:
-    return tuple({"limit": share * extent.command, "softness": soft} for share, soft in zip(AT, SOFT, strict=True))
+    return tuple({"limit": share * extent.command, "softness": soft} for share, soft in KNEES)
 
 
 class AmplifierSaturation(AbstractEffect, CommandTerm):
@@ -62,7 +53,7 @@ class AmplifierSaturation(AbstractEffect, CommandTerm):
         sentence="The amplifier or its supply is near the end of its range: of a large command less comes through.",
         switches=("lost",),
         initial_guess={"lost": 0.3, "limit": 1.0, "softness": 0.1},
-        applies=_applies,
+        applies=has_command,
         observable=_observable,
         bounds=_bounds,
         grid=_grid,

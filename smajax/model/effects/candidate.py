@@ -96,6 +96,11 @@ class Actuator(Protocol):
     def drive(self) -> AbstractDrive: ...
 
 
+def has_command(system: Actuator) -> bool:
+    """Whether a command heats the wire: in an oven there is none."""
+    return bool(system.drive.inputs_required)
+
+
 def _always(_: object) -> bool:
     return True
 

@@ -9,12 +9,8 @@ import jax.numpy as jnp
 from smajax.core.parameters import parameter
 from smajax.model.drive.inputs import CommandTerm
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Actuator, Candidate, Width
+from smajax.model.effects.candidate import Candidate, Width, has_command
 from smajax.model.types import Scalar
-
-
-def _applies(system: Actuator) -> bool:
-    return bool(system.drive.inputs_required)
 
 
 class DeadZone(AbstractEffect, CommandTerm):
@@ -36,7 +32,7 @@ class DeadZone(AbstractEffect, CommandTerm):
         "that much less from there on.",
         switches=("threshold",),
         initial_guess={"threshold": 0.02},
-        applies=_applies,
+        applies=has_command,
         prior_class="bench",
         widths={
             "threshold": Width(0.1, "output stages: millivolts to the 0.6 V of a diode; a duty of some per cent"),

@@ -7,13 +7,13 @@ from typing import ClassVar
 from smajax.core.parameters import parameter
 from smajax.model.drive.inputs import InputLagTerm
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import DELAY, Actuator, Candidate, Width
+from smajax.model.effects.candidate import DELAY, Actuator, Candidate, Width, has_command
 from smajax.model.load.coupon import AbstractCoupon
 from smajax.model.types import Scalar
 
 
 def _applies(system: Actuator) -> bool:
-    return bool(system.drive.inputs_required) or isinstance(system.load, AbstractCoupon)
+    return has_command(system) or isinstance(system.load, AbstractCoupon)
 
 
 class InputDelay(AbstractEffect, InputLagTerm):

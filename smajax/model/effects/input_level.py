@@ -9,12 +9,8 @@ import jax.numpy as jnp
 from smajax.core.parameters import parameter
 from smajax.model.drive.inputs import CommandTerm
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Actuator, Candidate, Width
+from smajax.model.effects.candidate import Candidate, Width, has_command
 from smajax.model.types import Scalar
-
-
-def _applies(system: Actuator) -> bool:
-    return bool(system.drive.inputs_required)
 
 
 class InputLevel(AbstractEffect, CommandTerm):
@@ -33,7 +29,7 @@ class InputLevel(AbstractEffect, CommandTerm):
         sentence="The input was not what the log says: a gain or a zero of the measurement or the amplifier is off.",
         switches=("gain", "offset"),
         initial_guess={"gain": 0.03, "offset": 0.02},
-        applies=_applies,
+        applies=has_command,
         prior_class="event",
         widths={
             "gain": Width(0.05, "shunts, dividers and amplifiers out of calibration: 1 to 10 %"),

@@ -84,12 +84,10 @@ class MinorLoops(AbstractEffect, RangeTerm):
     def _earlier(self, size: Scalar, z: Scalar, amplitude: Scalar) -> Scalar:
         """z, from 0 at the start of a range to 1 at its end, in a loop that is `amplitude` of a full one."""
         missing = _missing(amplitude)
-        small = self.small
         # The largest m (1 - r m) of all loops: at m = 1, or at 1/(2 r) where that is within.
-        largest = jnp.where(
-            small > 0.5, 0.25 / jnp.where(small > 0.5, small, 0.5), 1.0 - jnp.where(small > 0.5, 0.0, small)
-        )
-        early = size * missing * (1.0 - small * missing) / largest
+        within = self.small > 0.5
+        largest = jnp.where(within, 0.25 / jnp.where(within, self.small, 0.5), 1.0 - self.small)
+        early = size * missing * (1.0 - self.small * missing) / largest
         return z + early * (1.0 - self.pinned * z) / (1.0 + self.pinned * early)
 
     def heating_distance(self, law: Kinetics, z: Scalar, temperature: Scalar, stress: Scalar, old: WireState) -> Scalar:
