@@ -5,18 +5,21 @@ from __future__ import annotations
 import dataclasses
 from typing import ClassVar
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from smajax.attribution.unknown.search import unknown_terms
 from smajax.attribution.unknown.term_fits import with_terms
+from smajax.attribution.unknown.terms import UNKNOWN
 from smajax.model.drive.inputs import CommandTerm
 from smajax.model.effects.base import AbstractEffect
 from smajax.model.effects.library import LIBRARY
+from smajax.model.presets import build
 from smajax.model.types import Scalar, WireState
 from smajax.model.wire.constitutive import ConstitutiveTerm
-from smajax.model.wire.resistance import ResistanceTerm
+from smajax.model.wire.resistance import ResistanceTerm, resistance_per_metre
 from smajax.model.wire.wire import Wire
 from tests.helpers.stepped_weight import DT, LEVELS, NOISE, hidden_in_runs
 
@@ -77,6 +80,21 @@ def test_a_command_never_changes_its_sign_and_is_sought_where_the_effects_leave_
     for value in np.linspace(0.0, high, 21):
         assert float(cooling.command("voltage", jnp.asarray(value))) >= 0.0
         assert float(cooling.command("voltage", jnp.asarray(-value))) <= 0.0
+
+
+@pytest.mark.parametrize("name", ["unknown_resistance_of_temperature", "unknown_resistance_of_fraction"])
+def test_a_resistance_stays_above_a_tenth_of_the_base_models(name: str) -> None:
+    """With the coefficients at their bounds it was less than none, and the current cooled the wire."""
+    term = dataclasses.replace(UNKNOWN[name](c0=jnp.asarray(-4.0), c1=jnp.asarray(4.0)), scale=jnp.asarray(0.5))
+    wire = build("flexinol_table_3_2", "dead_weight", "amplified_voltage").wire
+    factor = [
+        float(resistance_per_metre(wire, [term], at, at) / resistance_per_metre(wire, [], at, at))
+        for at in map(jnp.asarray, np.linspace(0.0, 1.0, 21))
+    ]
+    assert min(factor) == pytest.approx(0.1)
+    assert max(factor) > 0.8  # and changes elsewhere
+    slope = jax.grad(lambda at: resistance_per_metre(wire, [term], at, at))
+    assert all(np.isfinite(float(slope(jnp.asarray(at)))) for at in (0.1, 0.5, 0.9))
 
 
 @pytest.mark.slow

@@ -30,6 +30,7 @@ from smajax.model.wire.wire import Wire
 
 FORMULA = "f: eleven cosine waves as cubic B-splines, each coefficient about twice its share of the usual largest f"
 COEFFICIENTS = tuple(f"c{wave}" for wave in range(COUNT))
+LEAST_RESISTANCE = 0.1  # of the base model's
 
 
 def _candidate(title: str, equation: Equation) -> Candidate:
@@ -114,6 +115,11 @@ class HeatOfFraction(AbstractUnknown, HeatTerm):
         return self.value(fraction)
 
 
+def _resisting(change: Scalar) -> Scalar:
+    """A relative change that leaves a tenth of the resistance at least: of less than none the current would cool the wire."""
+    return jnp.where(change > LEAST_RESISTANCE - 1.0, change, LEAST_RESISTANCE - 1.0)
+
+
 class ResistanceOfTemperature(AbstractUnknown, ResistanceTerm):
     """A relative change of the resistance."""
 
@@ -125,7 +131,7 @@ class ResistanceOfTemperature(AbstractUnknown, ResistanceTerm):
     unit: ClassVar[str] = "-"
 
     def resistance_factor(self, temperature: Scalar, fraction: Scalar) -> Scalar | float:
-        return self.value(temperature)
+        return _resisting(self.value(temperature))
 
 
 class ResistanceOfFraction(AbstractUnknown, ResistanceTerm):
@@ -141,7 +147,7 @@ class ResistanceOfFraction(AbstractUnknown, ResistanceTerm):
     unit: ClassVar[str] = "-"
 
     def resistance_factor(self, temperature: Scalar, fraction: Scalar) -> Scalar | float:
-        return self.value(fraction)
+        return _resisting(self.value(fraction))
 
 
 class CommandOfCommand(AbstractUnknown, CommandTerm):
