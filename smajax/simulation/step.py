@@ -38,7 +38,7 @@ from smajax.model.system import System, with_supply_history
 from smajax.model.types import Inputs, Motion, Scalar, State, WireState
 from smajax.model.wire.constitutive import reached, stress_at
 from smajax.model.wire.heat import stored_heat
-from smajax.model.wire.history import over
+from smajax.model.wire.history import over, with_step_to
 from smajax.model.wire.root import root
 from smajax.model.wire.two_populations import choose_branch, curve_on, open_branches, settled, with_amplitudes
 from smajax.simulation.stage_equations import Stage, Unknowns, beyond_stops, equations, motion_rates
@@ -210,13 +210,19 @@ def _moving_step(
 
 @traced_once
 def _coupon_step(system: System, state: State, inputs: Inputs, dt: Scalar) -> State:
-    """Temperature and stress at the end of the step are prescribed: the fraction follows in closed form."""
+    """Temperature and stress at the end of the step are prescribed: the fraction follows in closed form, or of a range that it moves as a root."""
     wire, terms, old = system.wire, system.terms, over(state.wire, dt)
     temperature, stress = inputs["temperature"], jnp.maximum(inputs["stress"], 0.0)
-    law, changed, at = wire.kinetics, terms.kinetics, (temperature, stress)
+    law, changed, at, before = wire.kinetics, terms.kinetics, (temperature, stress), old.martensite_fraction
     branch = choose_branch(law, changed, old, open_branches(law, changed, old), *at)
-    xi, parts = settled(law, changed, old, branch, *at, curve_on(law, changed, old, branch, *at))
-    new = with_amplitudes(law, changed, old, branch, reached(wire, terms.constitutive, old, *at, xi), parts)
+    if changed.move_within_step:
+        low, high = jnp.where(branch.heating, 0.0, before), jnp.where(branch.cooling, 1.0, before)
+        xi = root(lambda to: to - curve_on(law, changed, with_step_to(to, old), branch, *at), before, low, high)
+    else:
+        xi = curve_on(law, changed, old, branch, *at)
+    ranges = with_step_to(xi, old)
+    xi, parts = settled(law, changed, ranges, branch, *at, xi)
+    new = with_amplitudes(law, changed, ranges, branch, reached(wire, terms.constitutive, old, *at, xi), parts)
     return dataclasses.replace(state, time=state.time + dt, wire=new)
 
 
@@ -238,14 +244,15 @@ def _strain_coupon_step(system: System, state: State, inputs: Inputs, dt: Scalar
     branch = choose_branch(law, changed, old, open_branches(law, changed, old), temperature, frozen)
 
     def miss(xi: Scalar) -> Scalar:
-        return xi - curve_on(law, changed, old, branch, temperature, stress_of(xi))
+        return xi - curve_on(law, changed, with_step_to(xi, old), branch, temperature, stress_of(xi))
 
     low = jnp.where(branch.heating, 0.0, before)
     high = jnp.where(branch.cooling, 1.0, before)
     xi = root(miss, before, low, high)
-    xi, parts = settled(law, changed, old, branch, temperature, stress_of(xi), xi)
+    ranges = with_step_to(xi, old)
+    xi, parts = settled(law, changed, ranges, branch, temperature, stress_of(xi), xi)
     new = reached(wire, terms.constitutive, old, temperature, stress_of(xi), xi)
-    new = with_amplitudes(law, changed, old, branch, new, parts)
+    new = with_amplitudes(law, changed, ranges, branch, new, parts)
     still = jnp.zeros_like(strain)
     return dataclasses.replace(state, time=state.time + dt, wire=new, motion=Motion(-strain, still))
 

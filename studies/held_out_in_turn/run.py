@@ -137,7 +137,11 @@ def main() -> None:
     parser.add_argument("--again", action="store_true", help="make what is kept again")
     asked = parser.parse_args()
     prepare()
-    kept = {(one.wire, one.run): one for one in load(json.loads(KEPT.read_text(encoding="utf-8")))} if KEPT.exists() else {}
+    kept = (
+        {(one.wire, one.run): one for one in load(json.loads(KEPT.read_text(encoding="utf-8")))}
+        if KEPT.exists()
+        else {}
+    )
     for wire in WIRES:
         if asked.only not in (None, wire):
             continue
@@ -145,7 +149,10 @@ def main() -> None:
             if (wire, run) in kept and not asked.again:
                 continue
             one = kept[wire, run] = turn(wire, run)
-            print(f"{wire} {run}: {one.base:.3g} -> {one.extended:.3g}, {one.in_band:.0%} in the band, {one.seconds:.0f} s", flush=True)
+            print(
+                f"{wire} {run}: {one.base:.3g} -> {one.extended:.3g}, {one.in_band:.0%} in the band, {one.seconds:.0f} s",
+                flush=True,
+            )
             order = sorted(kept.values(), key=lambda each: list(WIRES).index(each.wire))
             replace(KEPT, json.dumps([asdict(each) for each in order], indent=1) + "\n")
             replace(PAGE, page(order))

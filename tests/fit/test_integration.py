@@ -5,11 +5,13 @@ from __future__ import annotations
 import dataclasses
 import itertools
 from functools import cache
+from types import SimpleNamespace
 
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from smajax.fit import integration
 from smajax.fit.integration import (
     LARGEST,
     choose_integration,
@@ -70,6 +72,29 @@ def test_an_input_that_is_not_late_is_integrated_as_finely_as_without_that_effec
 def test_one_step_a_sample_is_chosen_when_it_is_accurate_enough() -> None:
     problem = _problem("dead weight", 0.005)
     assert described(choose_integration(problem, problem.system)) == "one step a sample"
+
+
+@pytest.mark.parametrize(
+    ("errors", "chosen"),
+    [
+        (
+            [6.065, 6.064, 6.0, 5.9, 6.1, 6.2, 5.99],
+            0,
+        ),  # no step length settles a jump: seven times the time for nothing
+        ([3.0, 1.1, 0.9, 0.7, 0.6, 0.55, 0.5], 2),
+        ([3.0, 0.2, 0.09, 0.08, 0.07, 0.06, 0.06], 2),  # less than a tenth of the noise, if not by half
+        ([3.0, 0.2, 0.04, 0.01, 0.01, 0.01, 0.01], 2),
+        ([np.inf] * 7, 0),
+    ],
+)
+def test_the_cheapest_of_those_that_are_about_as_good_is_chosen(
+    errors: list[float], chosen: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem, given = _problem("coupon", 0.1), iter(errors)
+    monkeypatch.setattr(integration, "_predicted", lambda *_: np.zeros(()))
+    monkeypatch.setattr(integration, "_error", lambda *_: SimpleNamespace(share=next(given)))
+    found = choose_integration(problem, problem.system)
+    assert described(found) == described([ONE_STEP, *(Integration(substeps=2**k) for k in range(1, 7))][chosen])
 
 
 @pytest.mark.slow  # that the error is below a tenth of the noise is above

@@ -27,6 +27,7 @@ class DriftingTemperatures(AbstractEffect, HistoryTerm, RangeTerm):
     cycles: Scalar = parameter("-", 0.5, 1e4, "N_0: cycles after which 63 % of it is done", default=5.0)
 
     effect_name: ClassVar[str] = "drifting_temperatures"
+    moves_within_step: ClassVar[bool] = True
     candidate: ClassVar[Candidate] = Candidate(
         title="transformation temperatures drifting with cycles",
         equation="kinetics",

@@ -83,6 +83,15 @@ def transformed(old: WireState, new: WireState) -> dict[str, Scalar]:
     return {TRANSFORMED: old.history[TRANSFORMED] + jnp.abs(new.martensite_fraction - old.martensite_fraction)}
 
 
+def with_step_to(fraction: Scalar, old: WireState) -> WireState:
+    """`old` with what has transformed by the end of a step to `fraction`, where an effect counts that; else as it is."""
+    if TRANSFORMED not in old.history:
+        return old
+    return dataclasses.replace(
+        old, history={**old.history, **transformed(old, dataclasses.replace(old, martensite_fraction=fraction))}
+    )
+
+
 def forgotten(steps: Scalar) -> Scalar:
     """1 - exp(-steps), without the cancellation that leaves single precision nothing of a small one."""
     small = steps < 1e-3

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import abc
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import jax.numpy as jnp
 from jaxtyping import Array, Bool
@@ -45,7 +45,12 @@ class PlaceTerm(abc.ABC):  # noqa: B024  # each method by itself is enough
 
 
 class RangeTerm(abc.ABC):  # noqa: B024  # each method by itself is enough
-    """A range that is elsewhere. The direction of a step is then that of the moved distance."""
+    """A range that is elsewhere. The direction of a step is then that of the moved distance.
+
+    `moves_within_step`: what transforms in a step moves it, so that where a step ends is the root of an equation.
+    """
+
+    moves_within_step: ClassVar[bool] = False
 
     def heating_distance(self, law: Kinetics, z: Scalar, temperature: Scalar, stress: Scalar, old: WireState) -> Scalar:
         """The reduced distance itself, from what the law has; `old` is the wire before the step."""
@@ -76,6 +81,11 @@ class KineticsTerms(NamedTuple):
     def shape_branches(self) -> bool:
         """Whether an effect shapes the two branches, which are then no mirror images of each other."""
         return bool(self.shapes)
+
+    @property
+    def move_within_step(self) -> bool:
+        """Whether what transforms in a step moves its range."""
+        return any(term.moves_within_step for term in self.ranges)
 
 
 NO_TERMS = KineticsTerms()
