@@ -42,17 +42,19 @@ def _fractions() -> np.ndarray:
     above = STRESS / float(LAW.stress_slope_austenite), STRESS / float(LAW.stress_slope_martensite)
     heats = float(LAW.austenite_start), float(LAW.austenite_finish)
     cools = float(LAW.martensite_finish), float(LAW.martensite_start)
+
+    def miss(xi: float, temperature: float, heating: bool) -> float:
+        if heating:
+            at = temperature - above[0] - shift(DRIFT["first_heating"], 1.0 - xi)
+            return xi - cosine((at - heats[0]) / (heats[1] - heats[0]))
+        at = temperature - above[1] - shift(DRIFT["first_cooling"], 1.0 + xi)
+        return xi - cosine((at - cools[0]) / (cools[1] - cools[0]))
+
     found = []
     for number, temperature in enumerate(TEMPERATURE):
-
-        def miss(xi: float) -> float:
-            if number <= 90:
-                at = temperature - above[0] - shift(DRIFT["first_heating"], 1.0 - xi)
-                return xi - cosine((at - heats[0]) / (heats[1] - heats[0]))
-            at = temperature - above[1] - shift(DRIFT["first_cooling"], 1.0 + xi)
-            return xi - cosine((at - cools[0]) / (cools[1] - cools[0]))
-
-        found.append(0.0 if miss(0.0) == 0.0 else 1.0 if miss(1.0) == 0.0 else brentq(miss, 0.0, 1.0, xtol=1e-14))
+        given = float(temperature), number <= 90
+        ends = [xi for xi in (0.0, 1.0) if miss(xi, *given) == 0.0]
+        found.append(ends[0] if ends else brentq(miss, 0.0, 1.0, args=given, xtol=1e-14))
     return np.asarray(found)
 
 
