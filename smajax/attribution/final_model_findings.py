@@ -12,7 +12,6 @@ from smajax.attribution.findings import CoefficientFinding, EffectFinding, Param
 from smajax.attribution.fit_programs import Effects
 from smajax.attribution.job import Job
 from smajax.attribution.joint_parameters import JointParameters
-from smajax.attribution.laplace_evidence import square_of_slope
 from smajax.attribution.leave_one_run_out import jackknife_error
 from smajax.attribution.model_fits import Evidence, Model, Search
 from smajax.attribution.nuisance_grid import scores_at
@@ -27,6 +26,7 @@ from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.fit.uncertainty import Uncertainty, uncertainty
 from smajax.model.effects.library import LIBRARY
 from smajax.model.effects.prior_width import CoefficientPrior
+from smajax.model.system import with_mean_slopes
 
 LEAST_RUNS = 3  # two can be left out in one way only
 NORMAL_95 = 1.96
@@ -51,10 +51,9 @@ def parameters_found(job: Job, setting: Search, model: Model, start: np.ndarray,
     priors = setting.prior_records(presets=True, effects=model.effects, width_factors=model.width_factors)
     of_effects = {name: CoefficientPrior(one.mean, one.sigma, one.logarithmic) for name, one in priors.items()}
     known_before = {**of_effects, **known_before}
-    problem = own.with_system(own.system, priors=priors).with_noise(error)
+    problem = own.with_system(with_mean_slopes(own.system), priors=priors).with_noise(error)
     at: Sensitivity = sensitivity(problem, model.values[slots], names)
     values = {name: float(model.values[index(name)]) for name in names}
-    at = replace(at, jacobian=at.jacobian / np.sqrt(square_of_slope(model.effects)))
     known = uncertainty(at, names, values, job.bounds)
     table = parameters(job.problem.system)
     units = {name: entry.unit for name, entry in table.items()}

@@ -14,14 +14,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy  # its parts are imported when they are first used
 
 from smajax.attribution.joint_parameters import JointParameters, residual_and_columns
 from smajax.core.whiteness import correlation_time, on_samples, split_runs
-from smajax.model.effects.library import LIBRARY
+from smajax.model.system import with_mean_slopes
 
 ROUNDING = 1e-14  # of an eigenvalue of a matrix whose diagonal is one
 LONGEST = 50.0  # samples: beyond it the correlation of a residual is its own shape, and no property of a noise
@@ -92,6 +92,7 @@ def fitted_model(
     """`effects` at their fitted `values` (P,). `program`: effects of the program that computes it, these among them."""
     names = joint.free(effects)
     problem, index = joint.restricted(program)
+    problem = replace(problem, system=with_mean_slopes(problem.system))
     residual, columns = residual_and_columns(problem, values[index], names)
     at = {name: float(values[joint.slots[name]]) for name in names}
     scales = np.asarray([joint.scale(name, at[name]) for name in names])
@@ -113,7 +114,7 @@ def fitted_model(
         names=tuple(names),
         scales=scales,
         squares=float(residual @ residual),
-        gram=matrix.T @ matrix / square_of_slope(effects),
+        gram=matrix.T @ matrix,
         precision=precision,
         width_factors=factors,
         log_prior=log_prior,
@@ -122,11 +123,6 @@ def fitted_model(
         rms=float(np.sqrt(np.mean(residual**2))),
         correlation=correlation,
     )
-
-
-def square_of_slope(effects: Sequence[str]) -> float:
-    """By how much derivatives of a model with `effects` tell too much (`Candidate.square_of_slope`)."""
-    return max((LIBRARY[one].candidate.square_of_slope for one in effects if one in LIBRARY), default=1.0)
 
 
 def width_factor(deviations: np.ndarray) -> float:

@@ -21,7 +21,7 @@ from smajax.engine import Along, Program, by_machine_code, program
 from smajax.fit.needed_directions import NeededDirections
 from smajax.fit.packed_runs import predict_run
 from smajax.fit.problem import Problem
-from smajax.model.system import System
+from smajax.model.system import System, without_levels
 from smajax.model.types import Series
 from smajax.simulation.steppers import Integration
 
@@ -47,6 +47,8 @@ class _Run(eqx.Module):
     per_run: tuple[str, ...] = eqx.field(static=True)
     outputs: tuple[str, ...] = eqx.field(static=True)
     integration: Integration
+    # What was measured of it, and at one of the levels, where a sensor of the system shows levels: (outputs, N) and (outputs,).
+    seen: tuple[np.ndarray, np.ndarray] | None = None
 
 
 def _runs(problem: Problem) -> list[_Run]:
@@ -55,6 +57,7 @@ def _runs(problem: Problem) -> list[_Run]:
     inputs = {name: np.asarray(series) for name, series in batch.inputs.items()}
     overrides, dt = np.asarray(batch.overrides), np.asarray(batch.dt, dtype=float)
     names = problem.shared, batch.override_names, problem.per_run.names, batch.outputs
+    seen = None if without_levels(problem.system)[1] is None else batch.seen
     return [
         _Run(
             problem.system,
@@ -63,6 +66,7 @@ def _runs(problem: Problem) -> list[_Run]:
             dt,
             *names,
             batch.integration,
+            None if seen is None else (seen.samples[run], seen.level[run]),
         )
         for run in range(batch.runs)
     ]
@@ -82,6 +86,7 @@ def _predict(run: _Run, values: jax.Array) -> jax.Array:
         run.outputs,
         run.integration,
         once=True,
+        seen=run.seen,
     )
 
 

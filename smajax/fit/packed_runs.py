@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -15,12 +15,20 @@ from jaxtyping import Array, Float
 
 from smajax.core.parameters import set_parameters
 from smajax.data.experiment.record import RUN_STARTS, Run
-from smajax.model.system import System, initial_state
+from smajax.model.sensor_reading import LevelTerm
+from smajax.model.system import System, initial_state, without_levels
 from smajax.model.types import Scalar, State, Trajectory
 from smajax.simulation.compiled import compiled_run
-from smajax.simulation.sensors import sensor_output
+from smajax.simulation.sensors import own_sensor, sensor_output
 from smajax.simulation.simulate import simulate
 from smajax.simulation.steppers import ONE_STEP, Integration
+
+
+class Seen(NamedTuple):
+    """What was measured of every run, by output: the samples (runs, outputs, N), NaN where one is missing, and a reading at one of its levels (runs, outputs)."""
+
+    samples: Array | np.ndarray
+    level: Array | np.ndarray
 
 
 class RunBatch(eqx.Module):
@@ -37,6 +45,20 @@ class RunBatch(eqx.Module):
     dt: float = eqx.field(static=True)
     outputs: tuple[str, ...] = eqx.field(static=True, default=("reading",))
     integration: Integration = ONE_STEP  # how finely between two samples
+    # What was measured at one of the levels of a sensor that shows levels; None of runs that nobody has measured.
+    level: Float[Array, " series"] | None = None
+
+    @property
+    def seen(self) -> Seen | None:
+        """What was measured, for a sensor that shows levels."""
+        if self.level is None:
+            return None
+        shape, known = (self.runs, len(self.outputs)), (self.mask, self.output, self.level)
+        if any(isinstance(one, jax.core.Tracer) for one in known):
+            samples: Any = jnp.where(self.mask > 0, self.output, jnp.nan)
+            return Seen(samples.reshape(*shape, -1), self.level.reshape(shape))
+        mask, output, level = map(np.asarray, known)
+        return Seen(np.where(mask > 0, output, np.nan).reshape(*shape, -1), level.reshape(shape))
 
     @property
     def runs(self) -> int:
@@ -88,7 +110,18 @@ def pack(runs: Sequence[Run], dt: float, defaults: dict[str, float], integration
         dt=dt,
         outputs=tuple(runs[0].outputs),
         integration=integration,
+        level=stacked([commonest(series) for run in runs for series in run.outputs.values()]),
     )
+
+
+def commonest(readings: np.ndarray) -> float:
+    """The reading (n,) about which most of them lie: the half-sample mode (Bickel and Frühwirth 2006); 0 without any."""
+    left = np.sort(readings[np.isfinite(readings)])
+    while left.size > 2:
+        half = (left.size + 1) // 2
+        first = int(np.argmin(left[half - 1 :] - left[: left.size - half + 1]))
+        left = left[first : first + half]
+    return float(left.mean()) if left.size else 0.0
 
 
 def halved(batch: RunBatch) -> RunBatch:
@@ -107,16 +140,18 @@ def _started(
     names: Sequence[str],
     values: Float[Array, " name"] | Sequence[Scalar],
     inputs: dict[str, Float[Array, " time"]],
-) -> tuple[System, State | None]:
-    """`system` with one run's values of `names`, and the state it starts in where the model does not say it."""
+    seen: bool = False,
+) -> tuple[System, State | None, LevelTerm | None]:
+    """`system` with one run's values of `names`, the state it starts in where the model does not say it, and where it was `seen` what shows levels of its reading."""
     overrides = dict(zip(names, values, strict=True))
     celsius = overrides.pop("initial_temperature", None)
     here = set_parameters(system, {RUN_STARTS.get(name, name): value for name, value in overrides.items()})
+    here, levels = without_levels(here) if seen else (here, None)
     if celsius is None:
-        return here, None
+        return here, None, levels
     # A wire that was not at the air's temperature: at rest as if the air had been as warm.
     first = {name: series[0] for name, series in inputs.items()}
-    return here, initial_state(here, {**first, "ambient_temperature": celsius})
+    return here, initial_state(here, {**first, "ambient_temperature": celsius}), levels
 
 
 def predict_run(
@@ -128,35 +163,51 @@ def predict_run(
     outputs: Sequence[str],
     integration: Integration,
     once: bool = False,
+    seen: tuple[Array | np.ndarray, Array | np.ndarray] | None = None,
 ) -> Float[Array, "output time"]:
-    """Predicted sensor outputs of one run, with its `values` of `names`. `once`: as of `simulate`."""
-    here, initial = _started(system, names, values, inputs)
+    """Predicted sensor outputs of one run, with its `values` of `names`. `once`: as of `simulate`. `seen`: what was measured of it, (outputs, N) and (outputs,), as of `Seen`."""
+    here, initial, levels = _started(system, names, values, inputs, seen is not None)
     run = simulate(here, inputs, dt, initial, integration, once=once)
-    return jnp.stack([sensor_output(here, run, name) for name in outputs])
+    return jnp.stack([_shown(here, run, name, levels, seen, k) for k, name in enumerate(outputs)])
+
+
+def _shown(
+    system: System, run: Trajectory, name: str, levels: LevelTerm | None, seen: Any, number: int
+) -> Float[Array, " time"]:
+    """What a sensor shows of a run, the own one of the load beside what it has `seen` as output `number`."""
+    output = sensor_output(system, run, name)
+    if levels is None or not own_sensor(system, name):
+        return output
+    samples, level = seen
+    return levels.near(output, samples[number], level[number])
 
 
 def _compiled_runs(
-    system: System, batch: RunBatch, names: Sequence[str], values: np.ndarray
-) -> Iterator[tuple[System, Trajectory]]:
-    """Each run's system, with its `values` (R, names), and its trajectory."""
-    series = {name: np.asarray(one) for name, one in batch.inputs.items()}
+    system: System, batch: RunBatch, names: Sequence[str], values: np.ndarray, shown: bool = True
+) -> Iterator[tuple[Trajectory, list[np.ndarray]]]:
+    """Of each run, with its `values` (R, names): its trajectory, and what its sensors show, where that is asked for."""
+    series, seen = {name: np.asarray(one) for name, one in batch.inputs.items()}, batch.seen if shown else None
     for number in range(batch.runs):
         inputs = {name: jnp.asarray(one[number]) for name, one in series.items()}
-        here, initial = _started(system, names, [jnp.asarray(one) for one in values[number]], inputs)
-        yield here, compiled_run(here, inputs, batch.dt, batch.integration, initial)
+        own = None if seen is None else (seen.samples[number], seen.level[number])
+        here, initial, levels = _started(
+            system, names, [jnp.asarray(one) for one in values[number]], inputs, own is not None
+        )
+        run = compiled_run(here, inputs, batch.dt, batch.integration, initial)
+        outputs = batch.outputs if shown else ()
+        yield run, [np.asarray(_shown(here, run, name, levels, own, k)) for k, name in enumerate(outputs)]
 
 
 def simulate_batch(system: System, batch: RunBatch) -> Trajectory:
     """One trajectory per run, numpy's arrays of shape (R, N); outside of `jit`, `vmap` and `grad`."""
-    runs = [run for _, run in _compiled_runs(system, batch, batch.override_names, np.asarray(batch.overrides))]
-    return _stacked(runs)
+    values = np.asarray(batch.overrides)
+    return _stacked([run for run, _ in _compiled_runs(system, batch, batch.override_names, values, shown=False)])
 
 
 def simulate_with_outputs(system: System, batch: RunBatch) -> tuple[Trajectory, np.ndarray]:
     """(one trajectory per run, its leaves of shape (R, N); what the sensors of `batch` show, (series, N)), numpy's arrays."""
     runs = list(_compiled_runs(system, batch, batch.override_names, np.asarray(batch.overrides)))
-    outputs = [np.asarray(sensor_output(here, run, name)) for here, run in runs for name in batch.outputs]
-    return _stacked([run for _, run in runs]), np.stack(outputs)
+    return _stacked([run for run, _ in runs]), np.stack([one for _, outputs in runs for one in outputs])
 
 
 def _stacked(runs: Sequence[Trajectory]) -> Trajectory:
@@ -179,8 +230,7 @@ def predict_compiled(
     names, values = (*batch.override_names, *more_names), np.asarray(batch.overrides)
     if more is not None:
         values = np.concatenate([values, np.asarray(more)], axis=1)
-    runs = _compiled_runs(system, batch, names, values)
-    return np.stack([np.asarray(sensor_output(here, run, name)) for here, run in runs for name in batch.outputs])
+    return np.stack([one for _, outputs in _compiled_runs(system, batch, names, values) for one in outputs])
 
 
 def predict_batch(
@@ -190,4 +240,6 @@ def predict_batch(
     names = (*batch.override_names, *more_names)
     values = batch.overrides if more is None else jnp.concatenate([batch.overrides, more], axis=1)
     one = partial(predict_run, system, names=names, dt=batch.dt, outputs=batch.outputs, integration=batch.integration)
-    return jax.vmap(lambda inputs, row: one(inputs, row))(batch.inputs, values).reshape(batch.output.shape[0], -1)
+    seen = batch.seen
+    predicted = jax.vmap(lambda inputs, row, own: one(inputs, row, seen=own))(batch.inputs, values, seen)
+    return predicted.reshape(batch.output.shape[0], -1)

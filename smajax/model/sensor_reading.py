@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import abc
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple, Self
 
 from smajax.model.types import Scalar, State
 
@@ -27,6 +27,21 @@ class SensorTerm(abc.ABC):
     @abc.abstractmethod
     def sensed(self, reading: Scalar, time: Scalar, last: Scalar) -> Scalar:
         """What the sensor shows where it would show `reading`, the lag included; `last`: what this gave before."""
+
+
+class LevelTerm(SensorTerm):
+    """A sensor that shows levels: of a measured reading it is known between which two edges the motion was, and nowhere in between."""
+
+    @abc.abstractmethod
+    def near(self, reading: Scalar, measured: Scalar, level: Scalar) -> Scalar:
+        """What a fit holds against `measured` where the sensor would show `reading` without its levels: the level that was measured, and how far the motion lies outside of it.
+
+        `level`: what was measured at one of the levels; a `measured` of NaN, a missing sample: what the sensor shows.
+        """
+
+    @abc.abstractmethod
+    def with_mean_slope(self) -> Self:
+        """The same, with the derivative of a sensor without levels in `near`: of what readings tell in the mean, and not of what pulls at a fit."""
 
 
 class SensorTerms(NamedTuple):

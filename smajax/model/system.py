@@ -16,7 +16,7 @@ from smajax.model.effects.history_errors import history_entries_named
 from smajax.model.load import force
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.load.coupon import AbstractCoupon, StrainCoupon
-from smajax.model.sensor_reading import first_reading
+from smajax.model.sensor_reading import LevelTerm, first_reading
 from smajax.model.types import Inputs, Motion, Scalar, State, WireState
 from smajax.model.wire.constitutive import effect_strain, young_modulus
 from smajax.model.wire.heat import cross_section
@@ -93,6 +93,22 @@ def with_supply_history(system: System, inputs: Inputs, old: WireState, new: Wir
     ohms = resistance_per_metre(system.wire, terms.resistance, new.temperature, new.martensite_fraction)
     entries = supply.history_after_supply(system.drive, terms.supply, system.wire.wire_length, ohms, inputs, old)
     return dataclasses.replace(new, history={**new.history, **entries})
+
+
+def without_levels(system: System) -> tuple[System, LevelTerm | None]:
+    """(`system` with a sensor that shows everything, what shows levels of it last), for readings that are compared with measured ones."""
+    levels = [one for one in system.effects if isinstance(one, LevelTerm)]
+    if not levels:
+        return system, None
+    return dataclasses.replace(system, effects=tuple(one for one in system.effects if one is not levels[-1])), levels[
+        -1
+    ]
+
+
+def with_mean_slopes(system: System) -> System:
+    """`system` whose sensor's levels, if it shows any, have the derivative of their mean (`LevelTerm.with_mean_slope`)."""
+    effects = tuple(one.with_mean_slope() if isinstance(one, LevelTerm) else one for one in system.effects)
+    return dataclasses.replace(system, effects=effects)
 
 
 def load_resistance(system: System, time: Scalar, position: Scalar, velocity: Scalar, inputs: Inputs) -> Scalar:

@@ -7,7 +7,8 @@ as a tolerance asks for (`Integration`). Which is cheaper was measured on two co
   at a clock of 5 ms leave a tenth of the error. One program serves every tolerance, the finer one of the check too.
 - A batch: at a clock of 5 ms one step a sample takes half of the time of error-controlled steps (57 and 110 microseconds a run), so it is
   taken where it leaves little enough; at 250 ms error-controlled steps leave less in a quarter of that. Sixteen runs of the batch tell.
-- Reverse mode (`slopes`) cannot go back through steps whose number is not known: equal steps, in forward mode error-controlled ones.
+- Derivatives along equal steps are those of where branches begin and end within them, which may have another sign than the model's; along
+  error-controlled steps they are the model's. Reverse mode cannot go back through steps whose number is not known: it is for equal ones.
 """
 
 from __future__ import annotations
@@ -132,6 +133,11 @@ def _references(system: System, tolerance: float | Literal["auto"], switches: bo
         return (finest(system),)
     share = 1.0 if tolerance == AUTO else min(1.0, tolerance / TOLERANCES[-1])
     return tuple(with_tolerance(share * one) for one in (FINE, FINE_AGAIN)[: 1 + switches])
+
+
+def reference(system: System) -> Integration:
+    """What the others are measured against in a simulation."""
+    return _references(system, AUTO, switches=False)[0]
 
 
 def whole_transformation(system: System) -> dict[str, float]:

@@ -33,12 +33,14 @@ def sensors_of(system: System) -> dict[str, str]:
     return {name: unit, "resistance": SENSORS["resistance"]}
 
 
-def sensor_output(system: System, run: Trajectory, name: str) -> Series:
-    """What the sensor `name` shows of `run`, shape (n,): force A_w sigma, resistance R(xi) l_0 (eq. 3.15).
+def own_sensor(system: System, name: str) -> bool:
+    """Whether that is the load's own sensor, which may be called by its name or `reading`."""
+    return name in ("reading", system.load.reading[0])
 
-    The load's own sensor may be called by its name or `reading`.
-    """
-    if name in ("reading", system.load.reading[0]):
+
+def sensor_output(system: System, run: Trajectory, name: str) -> Series:
+    """What the sensor `name` shows of `run`, shape (n,): force A_w sigma, resistance R(xi) l_0 (eq. 3.15); the load's own by `own_sensor`."""
+    if own_sensor(system, name):
         return run.reading
     wire, stress, at = _known((system.wire, run.stress, (run.temperature, run.martensite_fraction)))
     if name == "force":

@@ -146,8 +146,6 @@ class Candidate:
     # Whether its priors take part in the fit whose values are reported as well: they say how smooth a shape is, which the runs alone
     # do not determine.
     keeps_priors: bool = False
-    # Mean square of a slope that stands in for one which is zero nearly everywhere, as of a staircase: by so much derivatives through it tell too much.
-    square_of_slope: float = 1.0
     # Whether it can change anything of this wire, load and drive: a candidate that cannot is not looked at.
     applies: Callable[[Actuator], bool] = _always
     # Whether runs of that extent could show it: a candidate that they cannot is not looked at.

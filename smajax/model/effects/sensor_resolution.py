@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-import math
-from typing import ClassVar
+import dataclasses
+from typing import ClassVar, Self
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
 from smajax.model.effects.candidate import Candidate, Extent, Width
-from smajax.model.sensor_reading import SensorTerm
+from smajax.model.sensor_reading import LevelTerm
 from smajax.model.types import Scalar
 
 PHASES = 12
 COARSE = 3.0  # noises
-SHARPNESS = 8  # half the power of the sine
-_MIDDLE = math.comb(2 * SHARPNESS, SHARPNESS)
-STEEPEST = 4.0**SHARPNESS / _MIDDLE  # with which the mean slope is one
-SQUARE = math.comb(4 * SHARPNESS, 2 * SHARPNESS) / _MIDDLE**2  # mean of its square then
+# Slope within a level in a fit, against 1 outside: by more of it a fit takes the noise of readings there for something to follow, and stops a twentieth of
+# the noise above the least squares; with none the normal equations are singular where no sample lies outside of its level.
+WITHIN = 0.05
 
 
 def _observable(extent: Extent) -> bool:
@@ -33,13 +33,12 @@ def _grid(extent: Extent) -> tuple[dict[str, float], ...]:
     return tuple({"increment": step, "zero": step * phase / PHASES} for phase in range(PHASES))
 
 
-class SensorResolution(AbstractEffect, SensorTerm):
+class SensorResolution(AbstractEffect, LevelTerm):
     r"""$y = (1 - s)\,x + s\,\{z + q\,\mathrm{round}[(x - z)/q]\}$; a share s of one is the staircase itself.
 
-    The stair's own derivative is zero wherever it is flat, and would tell a fit nothing of when the motion goes from one level to the next. In its place is
-    $5.09 \sin^{16}(\pi u)$, $u = (x - z)/q$, of mean one: a sample weighs the more the nearer it is to an edge. With $2 \sin^2(\pi u)$ a fit
-    holds back for samples between edges, which a motion within a level leaves as they are, and more of them end on the wrong side of an edge. Standard errors
-    and evidence are those of a sensor without a stair (`Candidate.square_of_slope`); a coarse stair tells less than that.
+    A fit holds against a measured level how far the motion lies outside of it (`near`), and not the next level: a motion that is a hair late at an edge
+    is off by a hair, and not by a whole increment, which outweighed all that the other samples say. Within the level nothing pulls at the motion. Standard errors
+    and evidence are those of a sensor without a stair (`with_mean_slope`); a coarse stair tells less than that.
     """
 
     share: Scalar = parameter("-", 0.0, 1.0, "s: share of the staircase in the reading", default=0.0)
@@ -55,16 +54,18 @@ class SensorResolution(AbstractEffect, SensorTerm):
         "m", -0.5, 0.5, "z: one of the readings (rad on an arm, - for a strain)", of_load="reading", default=0.0
     )
 
+    within: Scalar = eqx.field(converter=jnp.asarray, default=WITHIN)
+
     effect_name: ClassVar[str] = "sensor_resolution"
     candidate: ClassVar[Candidate] = Candidate(
         title="resolution of the sensor",
         equation="sensor",
         formula="y = (1 - s) x + s {z + q round[(x - z)/q]} (quantisation)",
-        sentence="The sensor shows steps: between two of its readings it does not see the motion.",
+        sentence="The sensor shows steps: between two of its readings it does not see the motion. What a model is off by is "
+        "how far its motion lies outside of the level that was read.",
         switches=("share",),
         initial_guess={"share": 0.9, "increment": 1e-3, "zero": 0.0},
         observable=_observable,
-        square_of_slope=SQUARE,
         grid=_grid,
         prior_class="bench",
         widths={
@@ -75,8 +76,31 @@ class SensorResolution(AbstractEffect, SensorTerm):
     )
 
     def sensed(self, reading: Scalar, time: Scalar, last: Scalar) -> Scalar:
-        fixed = jax.lax.stop_gradient
         steps = (reading - self.zero) / self.increment
-        slope = STEEPEST * jnp.sin(jnp.pi * fixed(steps)) ** (2 * SHARPNESS)
-        level = jnp.floor(fixed(steps) + 0.5) + slope * (steps - fixed(steps))
+        return self._shown(reading, steps, _nearest(steps), 0.0, 1.0)
+
+    def near(self, reading: Scalar, measured: Scalar, level: Scalar) -> Scalar:
+        steps = (reading - self.zero) / self.increment
+        missing = jnp.isnan(measured)
+        # Counted from one level, since each run has a zero of its own.
+        known = _nearest((level - self.zero) / self.increment)
+        number = known + _nearest((jnp.where(missing, level, measured) - level) / self.increment)
+        number = jnp.where(missing, _nearest(steps), number)
+        above, below = steps - number - 0.5, steps - number + 0.5
+        outside = jnp.where(above > 0.0, above, jnp.where(below < 0.0, below, 0.0))
+        return self._shown(reading, steps, number, outside, self.within)
+
+    def with_mean_slope(self) -> Self:
+        return dataclasses.replace(self, within=jnp.ones_like(self.within))
+
+    def _shown(
+        self, reading: Scalar, steps: Scalar, number: Scalar, outside: Scalar | float, within: Scalar | float
+    ) -> Scalar:
+        """The level of that `number`, and how far the reading lies `outside` of it, in increments; `within` it with that slope."""
+        along = within * (steps - jax.lax.stop_gradient(steps))
+        level = number + jnp.where(outside == 0.0, along, outside)
         return reading + self.share * (self.zero + self.increment * level - reading)
+
+
+def _nearest(steps: Scalar) -> Scalar:
+    return jnp.floor(jax.lax.stop_gradient(steps) + 0.5)

@@ -14,15 +14,18 @@ import numpy as np
 
 from smajax.core.files import json_line
 from smajax.engine import program
+from smajax.model.load.base import AbstractMovingLoad
 from smajax.simulation.batch.axes import Axes
 from smajax.simulation.batch.impossible import marked
-from smajax.simulation.batch.single_run import Recipe, single_run
+from smajax.simulation.batch.single_run import Recipe, single_run, slope_name
 from smajax.simulation.integration_error import (
+    LARGEST,
     IntegrationError,
     Outputs,
     Tolerance,
     coarse_to_fine,
     integrated,
+    reference,
     whole_transformation,
     with_tolerance,
 )
@@ -32,6 +35,7 @@ from smajax.simulation.steppers import Integration
 
 INTEGRATION, ERROR = "integration", "integration_error"  # attributes
 RUNS = 16  # on which the error is measured
+SLOPES = 0.02  # of the largest slope on these runs: what integration may leave in any of them
 MOST_BYTES = 1 << 27  # that these store
 
 
@@ -67,10 +71,14 @@ def _outputs(result: Mapping[str, np.ndarray], names: Sequence[str]) -> Outputs:
 def integrated_recipe(recipe: Recipe, axes: Axes, tolerance: Tolerance) -> tuple[Recipe, IntegrationError]:
     """(the recipe with the integration that `tolerance` asks for, what that leaves in what is stored)."""
     ways = _ways(recipe)
+    # A moving load's slopes are found along error-controlled steps: those through equal ones are slopes of where the branches happen to begin in them.
+    slopes = recipe.slopes if isinstance(recipe.system.load, AbstractMovingLoad) else ()
     # Where nothing that is stored can decide, the sensor's reading does.
-    plain = dataclasses.replace(recipe, slopes=(), keep=recipe.keep if ways else (*recipe.keep, "reading"))
+    plain = dataclasses.replace(recipe, slopes=slopes, keep=recipe.keep if ways else (*recipe.keep, "reading"))
     ways = ways or _ways(plain)
-    names = [*plain.keep, *(one.name for one in recipe.measures if one.smooth)]
+    smooth = [one.name for one in recipe.measures if one.smooth]
+    of_slopes = [slope_name(name, by) for name in smooth for by in slopes]
+    names = [*plain.keep, *smooth, *of_slopes]
     stored = recipe.steps // recipe.every + 1
     most = max(1, MOST_BYTES // (8 * stored * max(len(plain.keep), 1)))
     some = _some(axes, min(RUNS, most)) if tolerance is not None else {}
@@ -83,9 +91,18 @@ def integrated_recipe(recipe: Recipe, axes: Axes, tolerance: Tolerance) -> tuple
         # Runs with impossible values decide nothing.
         return None, _outputs(marked(recipe.system, some, found), names)
 
-    choices = coarse_to_fine(recipe.system, bool(recipe.slopes))
+    choices = coarse_to_fine(recipe.system, bool(recipe.slopes) and not slopes)
+    if slopes:
+        choices = (one for one in choices if one.tolerance is not None)
+        exact = run(reference(recipe.system))[1]
+        ways |= {name: _largest(exact[name]) * SLOPES / LARGEST for name in of_slopes if name in exact}
     integration, error, _ = integrated(run, recipe.system, tolerance, choices, ways)
     return dataclasses.replace(recipe, integration=integration), error
+
+
+def _largest(values: np.ndarray) -> float:
+    """Of the finite ones, not zero."""
+    return max(float(np.abs(values[np.isfinite(values)]).max(initial=0.0)), 1e-300)
 
 
 def attributes_of(recipe: Recipe, error: IntegrationError) -> dict[str, str]:

@@ -195,8 +195,3 @@ def _check_slopes(settings: BatchSettings, table: Parameters, channels: Sequence
         raise ValueError(f"{listed(jumping)} moves by whole steps and has no slope: leave it out, or `slopes`.")
     if slopes and not measures:
         raise ValueError("`slopes` are those of measures: give `measures`, as `smajax.simulation.measures.MeanSquare`.")
-    if slopes and settings.tolerance not in (None, AUTO):
-        raise ValueError(
-            "slopes are found backwards through fixed steps, and a `tolerance` makes their number depend on the parameters: "
-            "leave `tolerance` out (equal steps are chosen then), or `slopes`."
-        )

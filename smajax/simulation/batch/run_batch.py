@@ -68,12 +68,15 @@ def run_batch(  # the public form: what goes inwards is a `BatchSettings`
     is stored is taken, one step a sample where that is enough. What was reached is the attribute `integration_error` (JSON). With a number
     for `tolerance` a run takes as many steps between two samples as its error asks for: with 1e-4 (of 1 C and of 1 % strain, a step) and
     samples of 50 ms the worst runs are more accurate than with steps of 5 ms, typical ones less (to 1e-3 degrees), and it is several times
-    as fast; an end stop met at speed is no better. None is one step a sample, and nothing is measured. With slopes steps are equal.
+    as fast; an end stop met at speed is no better. None is one step a sample, and nothing is measured.
 
     `slopes` names parameters, and inputs of `axes`: the result then has the derivative of every measure by each of them, as
-    `mean_square_position_by_wire_diameter`. They are found backwards through the run (reverse mode): those of one measure by all
-    parameters together in less than four times the time of the run, those of each further measure in two or three times more, in memory
-    that grows as the square root of its steps. Those of a run that went wrong mean nothing: `good` leaves them out.
+    `mean_square_position_by_wire_diameter`. They are found along error-controlled steps (forward mode), at a
+    tolerance that leaves 2 % of the largest slope of the sixteen runs at most: each parameter costs about one run more, for all measures together. Past an end stop that
+    the load meets at speed they lack what the time of the impact changes. Through equal steps the derivative of
+    a run that transforms fully is that of where branches end within the steps, which may have another sign. With a `tolerance` of None, and of a coupon, steps are equal, and slopes
+    are found backwards through the run (reverse mode): those of one measure by all parameters together in less than four times the time of the run, in memory that grows as the square
+    root of its steps. Take `dt` so small then that half of it changes them little. Those of a run that went wrong mean nothing: `good` leaves them out.
 
     The result has the dimensions of `axes` and `time`, `status` (0 good, 1 a number that is not finite, 2 runaway heat, 3 a stage that did not converge, 4 impossible parameters) and
     `first_bad_time`. Results take a quarter of `budget` bytes at a time, or of half of the memory that is left. With `out` they are streamed to a Zarr group

@@ -71,12 +71,37 @@ def _per(above: str, below: str) -> str:
 def single_run(recipe: Recipe, values: Values) -> dict[str, jax.Array]:
     """Simulate one run. Stored values are arrays (steps // every + 1,), everything else is a number.
 
-    Pure: `jit`, `vmap` and differentiate it as you like, but for the slopes that the recipe asks for: they are found
-    backwards through the run, whatever their number, once for every measure, and have no derivative of their own.
+    Pure: `jit`, `vmap` and differentiate it as you like, but for the slopes that the recipe asks for, which have no derivative of their own: with
+    error-controlled steps they are found along the run, parameter by parameter; with equal steps backwards through it, whatever their number, once for
+    every measure.
     """
     if not recipe.slopes:
         return without_slopes(recipe, values)
     at = {name: values[name] if name in values else get_parameters(recipe.system, [name])[0] for name in recipe.slopes}
+    return (
+        _slopes_along(recipe, values, at)
+        if recipe.integration.tolerance is not None
+        else _slopes_back(recipe, values, at)
+    )
+
+
+def _slopes_along(recipe: Recipe, values: Values, at: Values) -> dict[str, jax.Array]:
+    """In forward mode: steps whose number depends on the parameters have no way back."""
+    names = [one.name for one in recipe.measures]
+
+    def measured(place: jax.Array) -> tuple[jax.Array, dict[str, jax.Array]]:
+        result = without_slopes(recipe, values | dict(zip(at, place, strict=True)))
+        return jnp.stack([jnp.asarray(result[name], dtype=float) for name in names]), result
+
+    slopes, result = jax.jacfwd(measured, has_aux=True)(
+        jnp.stack([jnp.asarray(one, dtype=float) for one in at.values()])
+    )
+    found = {slope_name(name, by): slopes[row, k] for row, name in enumerate(names) for k, by in enumerate(at)}
+    return result | found
+
+
+def _slopes_back(recipe: Recipe, values: Values, at: Values) -> dict[str, jax.Array]:
+    """In reverse mode."""
     names = [one.name for one in recipe.measures]
 
     def measured(at: Values) -> tuple[tuple[Scalar, ...], dict[str, jax.Array]]:
