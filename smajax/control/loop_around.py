@@ -20,7 +20,7 @@ from smajax.model.system import System
 def loop_around(
     system: System,
     controller: str | AbstractController,
-    gains: Mapping[str, float | str] | Gains | Path | None = None,
+    gains: Mapping[str, float | str] | Gains | Path | str | None = None,
     *,
     estimator: str | AbstractEstimator | None = None,
     noise: float | str = 0.0,
@@ -58,10 +58,10 @@ def loop_around(
     return Loop(preset.plant(system), _gains(controller, gains, known).put(known), filtered, sensor, delay)
 
 
-def _gains(controller: str, gains: Mapping[str, float | str] | Gains | Path | None, system: System) -> Gains:
+def _gains(controller: str, gains: Mapping[str, float | str] | Gains | Path | str | None, system: System) -> Gains:
     """Numbers in SI. Raises ValueError for gains of another controller."""
-    if isinstance(gains, Path):
-        gains = read_gains(gains, system)
+    if isinstance(gains, Path | str):
+        gains = read_gains(Path(gains), system)
     if isinstance(gains, Gains):
         if gains.controller != controller:
             raise ValueError(f"these gains are of {gains.controller}, expected those of {controller}.")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Mapping
 
 import equinox as eqx
@@ -29,7 +30,12 @@ from smajax.simulation.integration_error import AUTO, IntegrationError, Toleranc
 from smajax.simulation.simulate import DEFAULT_STEP, warn_of_length
 
 PERIOD = 0.01  # s, of the controller
+BEYOND = 0.01  # of the way between the end stops: from there on a set point is a mistake
 SAMPLED = "sampled"  # attribute of a `reading` that is no state of the plant: the sensor's, held for a control period
+
+
+class SetPointWarning(UserWarning):
+    """A set point lies beyond the load's end stops."""
 
 
 class Loop(eqx.Module):
@@ -98,6 +104,7 @@ def simulate_loop_dataset(
     check_interface("", 0.0, period, dt)
     every = round(period / dt)
     wanted = _wanted(set_point, system.load.reading[1], seconds, dt)
+    _warn_beyond_stops(system.load, wanted)
     samples = (wanted.position.shape[0] - 1) // every * every + 1
     if samples <= every:
         raise ValueError(f"the run is shorter than one control period of {period:g} s.")
@@ -118,6 +125,19 @@ def simulate_loop_dataset(
         controller=type(controller).__name__,
         gains=parameter_values(controller),
     )
+
+
+def _warn_beyond_stops(load: AbstractMovingLoad, wanted: Reference) -> None:
+    low, high = (float(one) for one in load.limits())
+    least, most = float(np.min(wanted.position)), float(np.max(wanted.position))
+    room, unit = (BEYOND * (high - low) if np.isfinite(high - low) else 0.0), load.reading[1]
+    if least < low - room or most > high + room:
+        warnings.warn(
+            f"the set point goes from {least:.4g} to {most:.4g} {unit}, and the load between its end stops from {low:.4g} to {high:.4g} {unit}: "
+            f"a number is in {unit}; of another unit give text (`'60 deg'`).",
+            SetPointWarning,
+            stacklevel=3,
+        )
 
 
 def _wanted(set_point: float | str | Reference, unit: str, seconds: float | None, dt: float) -> Reference:

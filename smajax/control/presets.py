@@ -30,6 +30,7 @@ from smajax.core.names import close_matches, listed
 from smajax.core.parameters import set_parameters
 from smajax.core.plugins import resolved
 from smajax.core.provenance import code_mark
+from smajax.core.units import parse_quantity
 from smajax.model.load.arm import Arm
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System
@@ -326,17 +327,18 @@ FILTERS: dict[str, Callable[[System], AbstractEstimator]] = {
 }
 
 
-def filter_of(name: str, system: System, noise: float = 0.0) -> AbstractEstimator:
+def filter_of(name: str, system: System, noise: float | str = 0.0) -> AbstractEstimator:
     """The filter of this name in `FILTERS` that believes in `system`, for readings with this noise.
 
-    noise: standard deviation of a reading, rad or m, as the loop's sensor has it; 0: not known, and the filter has its preset's (`model`:
+    noise: standard deviation of a reading, rad or m or text (`"0.3 deg"`), as the loop's sensor has it; of one that shows steps of q at least q over the root of 12. 0: not known, and the filter has its preset's (`model`:
     2e-5 of the wire's length, 0.06 deg of the arm; `adaptive`: 3.2e-5, 0.1 deg). `printed` keeps the R of its preset. Raises KeyError for a
     filter there is not, ValueError for a load that it does not go with.
     """
     if name not in FILTERS:
         raise KeyError(f"no filter {name!r}{close_matches(name, FILTERS, 'there are')}")
-    made = FILTERS[name](system)
-    return made.with_reading_noise(noise) if noise else made
+    made, unit = FILTERS[name](system), moving_load(system).reading[1]
+    sigma = parse_quantity(noise, unit, bare=unit)
+    return made.with_reading_noise(sigma) if sigma else made
 
 
 def controllers_for(system: System) -> list[str]:
@@ -344,8 +346,18 @@ def controllers_for(system: System) -> list[str]:
     return [name for name, preset in CONTROLLERS.items() if not preset.missing(system)]
 
 
+def check_name(name: object) -> None:
+    """TypeError for a controller where the name of one is expected."""
+    if not isinstance(name, str):
+        raise TypeError(
+            f"expected the name of a controller, got a {type(name).__name__}: one of your own gets a name, the box of its gains and how it is made by "
+            "`sma.CONTROLLERS['name'] = ControllerPreset(...)` (docs/how-to/add-a-controller.md)."
+        )
+
+
 def check_controller(name: str, system: System) -> None:
-    """ValueError for a controller there is not, or one that needs what this plant does not give; with those that can."""
+    """ValueError for a controller there is not, or one that needs what this plant does not give; with those that can. TypeError for what is no name."""
+    check_name(name)
     if name not in CONTROLLERS:
         raise ValueError(f"no controller `{name}`{close_matches(name, CONTROLLERS, 'there are')}.")
     if lacking := CONTROLLERS[name].missing(system):

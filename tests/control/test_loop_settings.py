@@ -14,6 +14,8 @@ import pytest
 from smajax.cli.commands.sweep import loop_of
 from smajax.cli.plant_options import LoopPlants
 from smajax.control.gains_file import Gains, GainsFileError, read_gains, write_gains
+from smajax.control.loop_around import loop_around
+from smajax.control.loop_dataset import SetPointWarning, simulate_loop_dataset
 from smajax.control.loop_settings import LoopInUse, LoopSettings, joined
 from smajax.control.model_as_plant import noise_of_file, plant_of, within_limit
 from smajax.control.presets import CONTROLLERS
@@ -21,6 +23,7 @@ from smajax.control.reach import reach_of
 from smajax.control.run_notes import InputLagLeftOut, gains_of_files
 from smajax.control.run_request import LoopRequest, RunRequest, run_closed
 from smajax.control.run_result import RunResult
+from smajax.core.parameters import parameter_values
 from smajax.data.model_file.of_presets import model_of_presets
 from smajax.data.model_file.read import load_model
 from smajax.data.model_file.record import ModelOutput, ModelParameter
@@ -333,3 +336,22 @@ def test_a_loop_around_a_model_is_without_the_delay_of_its_logs_and_says_the_opt
         run_closed(
             RunRequest(model=kept, dt=0.01), dataclasses.replace(request, mismatch={"input_delay.delay": "20ms"})
         )
+
+
+def test_a_file_of_gains_may_be_named_by_text(tmp_path: Path) -> None:
+    """It was taken for gains, letter by letter."""
+    plant = arm()
+    own = parameter_values(loop_around(plant, "pid").controller)
+    gains = Gains("pid", {name: 0.5 * own[name] for name in CONTROLLERS["pid"].box})
+    path = write_gains(tmp_path / "gains.json", gains, gains.units(plant), {})
+    by_text, by_path = (loop_around(plant, "pid", one).controller for one in (str(path), path))
+    assert parameter_values(by_text) == parameter_values(by_path) != own
+
+
+@pytest.mark.parametrize("set_point", [60, "120 deg"])
+def test_a_set_point_beyond_the_end_stops_is_said(set_point: float | str) -> None:
+    loop = loop_around(arm(), "pid")
+    with pytest.warns(
+        SetPointWarning, match=r"rad, and the load between its end stops from -0.7854 to 1.658 rad: a number is in rad"
+    ):
+        simulate_loop_dataset(loop, set_point, seconds=0.05, dt=0.01)

@@ -15,7 +15,7 @@ from smajax.control.measured_state import MeasuredState
 from smajax.control.presets import CONTROLLERS
 from smajax.control.reference import Reference
 from smajax.control.sweep.run_sweep import TRUE_STATE, SweepSettings, begun_sweep, sweep_controllers
-from smajax.control.tune.settings import TuneSettings
+from smajax.control.tune.settings import TuneSettings, settings_for
 from smajax.control.tune.tuning_folder import check_folder, settings_record
 from smajax.core.files import json_text
 from smajax.core.parameters import get_parameters, parameter, set_parameters
@@ -131,3 +131,14 @@ def test_a_tuning_in_a_folder_is_not_gone_on_with_where_the_controllers_code_or_
         monkeypatch.setitem(CONTROLLERS, "own", other)
         with pytest.raises(ValueError, match="other code or values of the controller"):
             check_folder(tmp_path, record())
+
+
+def test_a_controller_where_a_name_is_expected_is_told_how_to_get_one() -> None:
+    """It ended in `unhashable type`."""
+    own: Any = Proportional(gain=1.0, bias=1.0, most=10.0)
+    for begin in (
+        lambda: settings_for(arm(), own),
+        lambda: next(iter(sweep_controllers(arm(), dataclasses.replace(SWEEP, controllers=(own,))))),
+    ):
+        with pytest.raises(TypeError, match=r"expected the name of a controller, got a Proportional.*CONTROLLERS"):
+            begin()

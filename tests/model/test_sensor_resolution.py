@@ -80,15 +80,18 @@ def test_the_reading_about_which_most_lie_is_found_among_levels_and_noise() -> N
 def test_a_fit_is_pulled_by_samples_outside_of_their_level_and_evidence_counts_all() -> None:
     measured = ZERO + 3 * INCREMENT
 
+    def near(x: Any, sensor: SensorResolution) -> Any:
+        return sensor.near(x, jnp.asarray(measured), jnp.asarray(measured))
+
     def slope(x: float, sensor: SensorResolution) -> float:
-        return float(jax.grad(lambda x: sensor.near(x, measured, jnp.asarray(measured)))(x))
+        return float(jax.grad(near)(x, sensor))
 
     sensor = SensorResolution(share=1.0, increment=INCREMENT, zero=ZERO)
     assert slope(measured + 0.4 * INCREMENT, sensor) == pytest.approx(WITHIN)
     assert slope(measured + 0.6 * INCREMENT, sensor) == pytest.approx(1.0)
     for x in (measured + 0.4 * INCREMENT, measured + 0.6 * INCREMENT):
         assert slope(x, sensor.with_mean_slope()) == pytest.approx(1.0)
-        assert float(sensor.near(x, measured, measured)) == float(sensor.with_mean_slope().near(x, measured, measured))
+        assert float(near(x, sensor)) == float(near(x, sensor.with_mean_slope()))
 
 
 def test_a_stair_within_the_noise_is_not_looked_for() -> None:

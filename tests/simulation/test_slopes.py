@@ -141,7 +141,7 @@ def test_slopes_are_the_models_where_a_wire_transforms_fully() -> None:
     for name, value in about.items():
         # Differences of runs that are integrated far more finely, over steps that are large beside what is left of the integration.
         ends = [value * (1.0 + share) for share in (-1e-3, 1e-3)]
-        axes = grid(**{"voltage": volts, name: ends})
+        axes = grid({"voltage": volts, name: ends})
         ahead = run_batch(ARM, {}, axes, seconds=20.0, keep=(), measures=measures, tolerance=1e-9)
         for one in measures:
             differences = np.diff(ahead[one.name], axis=1)[:, 0] / (ends[1] - ends[0])

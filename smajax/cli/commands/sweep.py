@@ -84,7 +84,9 @@ class _Options:
             )
         if not first or "," in second:
             raise typer.BadParameter(
-                f"one mismatch, or two with a comma between them, not `{self.over}`", param_hint="--over"
+                f"one mismatch, or two with a comma between them, not `{self.over}`. More of them at once are a batch of plants: "
+                "`sweep_controllers(..., plants=...)` in Python (docs/reference/control.md).",
+                param_hint="--over",
             )
         first, second = short_name(first), short_name(second)
         try:

@@ -47,11 +47,13 @@ def corrected(belief: Belief, reading: Scalar, seen: Vector, reading_variance: S
     r"""Use a reading of `seen` @ state (Elahinia 2004, eq. 4.22).
 
     The covariance in Joseph's form, $(I - K H) P (I - K H)^T + K R K^T$: equal to the printed $(I - K H) P$ for this
-    gain, and no rounding makes it negative.
+    gain, and no rounding makes it negative. A reading of NaN, a missing one, corrects nothing.
     """
     seen_with = belief.covariance @ seen
-    innovation = Innovation(reading - seen @ belief.mean, seen @ seen_with + reading_variance)
-    gain = seen_with / innovation.variance
+    missing = jnp.isnan(reading)
+    off = jnp.where(missing, 0.0, jnp.where(missing, 0.0, reading) - seen @ belief.mean)
+    innovation = Innovation(off, seen @ seen_with + reading_variance)
+    gain = jnp.where(missing, 0.0, seen_with / innovation.variance)
     complement = jnp.eye(seen.size, dtype=seen.dtype) - jnp.outer(gain, seen)
     covariance = symmetric(complement @ belief.covariance @ complement.T + reading_variance * jnp.outer(gain, gain))
     return Belief(belief.mean + gain * innovation.value, covariance), innovation

@@ -2,24 +2,38 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
+import jax
 import jax.numpy as jnp
+import numpy as np
 
+from smajax.control.estimators.adaptive_filter import AdaptiveFilter
 from smajax.control.estimators.base import AbstractEstimator
+from smajax.control.estimators.model_filter import ModelFilter
+from smajax.control.estimators.printed_filter import PrintedFilter
 from smajax.control.measured_state import MeasuredState
+from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.types import Scalar, Series
 from smajax.simulation.integrate import Carry, Schedule, integrate
 from smajax.simulation.observers import StateTrace
 
+BEYOND = 0.1  # of the way between the end stops
+
+
+class ReadingsWarning(UserWarning):
+    """Readings lie where the load cannot be: another unit, another zero, or another load."""
+
 
 def estimate(
-    estimator: AbstractEstimator, readings: Series, voltages: Series, period: Scalar | float
+    estimator: AbstractEstimator, readings: Series | np.ndarray, voltages: Series | np.ndarray, period: Scalar | float
 ) -> tuple[Any, MeasuredState]:
     """(memory, estimate) at every sample of `readings`, arrays of shape (n, ...); samples are `period` seconds apart.
 
-    `voltages[i]` was held from sample i to sample i + 1, as in `simulate`; the last one is not used. Raises ValueError
-    when the two series are not of one length.
+    `voltages[i]` was held from sample i to sample i + 1, as in `simulate`; the last one is not used. A reading of NaN is a
+    missing one, which corrects nothing. Raises ValueError when the two series are not of one length, where the first reading is missing, and for a missing
+    one with the filter `printed`, which takes rates from readings. A ReadingsWarning says of readings that the load cannot have: SI, an angle in rad.
     """
     readings, voltages = jnp.asarray(readings, dtype=float), jnp.asarray(voltages, dtype=float)
     if readings.shape != voltages.shape or readings.ndim != 1:
@@ -27,6 +41,7 @@ def estimate(
             f"`readings` and `voltages` must be two series of one length, not of the shapes {readings.shape} and "
             f"{voltages.shape}. Use `jax.vmap` over a batch."
         )
+    _check(estimator, readings)
     span = jnp.asarray(period, dtype=float)
 
     def advance(carry: Carry, now: tuple[Scalar, Scalar]) -> Carry:
@@ -34,3 +49,30 @@ def estimate(
 
     start, steps = Carry(estimator.start(readings[0])), Schedule(readings.size - 1)
     return integrate(advance, start, (readings[1:], voltages[:-1]), steps, (StateTrace(),)).results[0]
+
+
+def _check(estimator: AbstractEstimator, readings: Series) -> None:
+    """Of a log at hand; within `jit` nothing is known of it."""
+    if isinstance(readings, jax.core.Tracer):
+        return
+    values = np.asarray(readings)
+    if np.isnan(values[0]):
+        raise ValueError("the first of `readings` is NaN: a filter begins at a reading. Begin the log at one.")
+    if np.isnan(values).any() and isinstance(estimator, PrintedFilter):
+        raise ValueError(
+            f"{int(np.isnan(values).sum())} of `readings` are NaN, and the filter `printed` takes rates from their differences: "
+            "fill them, or take `model` or `adaptive`."
+        )
+    believed = estimator.filter if isinstance(estimator, AdaptiveFilter) else estimator
+    load = believed.system.load if isinstance(believed, ModelFilter | PrintedFilter) else None
+    if not isinstance(load, AbstractMovingLoad):
+        return
+    low, high = sorted(float(load.sensed(jnp.asarray(end))) for end in load.limits())
+    least, most = float(np.nanmin(values)), float(np.nanmax(values))
+    room, unit = BEYOND * (high - low), load.reading[1]
+    if np.isfinite(room) and (least < low - room or most > high + room):
+        warnings.warn(
+            f"`readings` go from {least:.4g} to {most:.4g} {unit}, and the load from {low:.4g} to {high:.4g} {unit}: are they in {unit}?",
+            ReadingsWarning,
+            stacklevel=3,
+        )

@@ -16,7 +16,7 @@ from smajax.control.position_unit import (
     unit_named,
     unit_of,
 )
-from smajax.control.presets import CONTROLLERS, check_controller
+from smajax.control.presets import CONTROLLERS, check_controller, check_name
 from smajax.control.scales import is_arm, seconds_for
 from smajax.control.signal_path import between_in_words, check_interface, check_set_points
 from smajax.control.tune import adam
@@ -179,6 +179,7 @@ def settings_for(system: System, controller: str, plants: Plants | None = None, 
     given: fields of `TuneSettings`. Set points, noise and quantum in degrees of an angle and millimetres of a length, weights and limits
     in these too.
     """
+    check_name(controller)
     unit = unit_of(system)
     defaults: dict[str, Any] = {"unit": unit.shown, "command": unit.command, "weights": regulation_weights(system)}
     defaults["seconds"] = seconds_for(system)
