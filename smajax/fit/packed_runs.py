@@ -154,7 +154,7 @@ def _started(
     return here, initial_state(here, {**first, "ambient_temperature": celsius}), levels
 
 
-def predict_run(
+def predict_run(  # a run, how it is integrated, and what was measured of it
     system: System,
     inputs: dict[str, Float[Array, " time"]],
     values: Float[Array, " name"],

@@ -72,10 +72,9 @@ def turn(wire: str, run: str) -> Turn:
     with TemporaryDirectory() as folder:
         path = Path(folder) / "experiment.toml"
         path.write_text(with_held_out(text, run), encoding="utf-8")
-        experiment = load_experiment(path, CATALOGUE)
-    began = clock.monotonic()
-    found = close_loop(experiment)
-    seconds = clock.monotonic() - began
+        began = clock.monotonic()
+        found = close_loop(load_experiment(path, CATALOGUE))
+        seconds = clock.monotonic() - began
     one = next(each for each in found.runs if each.name == run)
     average = one.average
     if average is None:
