@@ -57,7 +57,8 @@ def answer(result: TuningResult) -> str:
     errors = [_shown(float(_column(result, check, name).max()), unit, 2) for name in ("overshoot", "steady_error")]
     sentence += f"; the overshoot is at most {errors[0]}, the steady error at most {errors[1]}."
     unseen = met(result, result.checks["inside"])
-    return f"{sentence} On plants and set points never seen they do in {int(unseen.sum()) or 'none'} of {unseen.size}."
+    new = "plants and set points" if settings.variation or settings.batch else "set points"
+    return f"{sentence} On {new} never seen they do in {int(unseen.sum()) or 'none'} of {unseen.size}."
 
 
 def _when(worst: Mapping[float, float], nowhere: Collection[float], symbol: str) -> str:

@@ -135,7 +135,11 @@ def in_moves(result: TuningResult) -> list[str]:
     overshoot, at = float(moves.overshoot[1].max()), ends[int(np.argmax(moves.overshoot[1]))]
     never = int((~np.isfinite(moves.settling_time[1])).sum())
     slowest = float(np.max(moves.settling_time[1], where=np.isfinite(moves.settling_time[1]), initial=0.0))
-    settled = f"{never} of {len(ends)} never settle" if never else f"all settle, in {digits(slowest, 3)} s at most"
+    settled = (
+        f"{never} of {len(ends)} never {'settles' if never == 1 else 'settle'}"
+        if never
+        else f"all settle, in {digits(slowest, 3)} s at most"
+    )
     limits = result.settings.limits
     missed = [
         word

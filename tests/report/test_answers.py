@@ -31,7 +31,14 @@ def tuned(settling: list[list[float]], limits: dict[str, float], unseen: list[fl
         exact[1, :, COLUMNS.index("steady_error")] = 1e-9
         return SimpleNamespace(seen=SimpleNamespace(exact=exact), scenarios=SimpleNamespace(targets=at))
 
-    settings = SimpleNamespace(controller="pid", seconds=SECONDS, limits=limits, shown=PositionUnit("mm", "m"))
+    settings = SimpleNamespace(
+        controller="pid",
+        seconds=SECONDS,
+        limits=limits,
+        shown=PositionUnit("mm", "m"),
+        variation={"damping": 0.2},
+        batch=0,
+    )
     checks = {
         "tuned on": check(np.concatenate(settling), targets),
         "inside": check(np.asarray(unseen), np.full(len(unseen), 0.0075)),
@@ -48,6 +55,12 @@ def test_a_tuning_that_reaches_every_set_point_says_when_and_how_far_off() -> No
     head, rows = tune_answer.set_point_rows(result)
     assert head[:2] == ["set point (mm)", "plants that settle"]
     assert rows == [["5", "2 of 2", "1.5", "2", "0.04", "0"], ["10", "2 of 2", "2.75", "3", "0.06", "0"]]
+
+
+def test_no_plants_are_said_to_be_new_where_none_varied() -> None:
+    result = tuned([[1.0], [3.0]], {}, [2.0])
+    result.settings.variation = {}
+    assert tune_answer.answer(result).endswith("On set points never seen they do in 1 of 1.")
 
 
 def test_a_tuning_that_does_not_says_where_and_on_which_share_of_the_plants() -> None:
