@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import math
 from collections.abc import Callable
 from typing import NamedTuple, TypeVar
 
@@ -34,10 +35,10 @@ from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.load.coupon import Coupon, StrainCoupon
 from smajax.model.load.friction import in_use, rubbing
 from smajax.model.sensor_reading import followed, reading_of, time_constant
-from smajax.model.system import System, with_supply_history
+from smajax.model.system import System, load_resistance, with_supply_history
 from smajax.model.types import Inputs, Motion, Scalar, State, WireState
 from smajax.model.wire.constitutive import reached, stress_at
-from smajax.model.wire.heat import stored_heat
+from smajax.model.wire.heat import cross_section, stored_heat
 from smajax.model.wire.history import over, with_step_to
 from smajax.model.wire.root import root
 from smajax.model.wire.two_populations import choose_branch, curve_on, open_branches, settled, with_amplitudes
@@ -203,9 +204,36 @@ def _moving_step(
     shares = [jnp.stack([share * dt for share in row]) for row in (scheme.moved, scheme.later_moved, scheme.compared)]
     none = [0.0 * one for one in start]  # with a derivative, as in `simulate`
     end, _ = lax.scan(recomputed(body), _Bases(first, list(start), none), (times, elapsed, *shares))
-    old = end.stage.old
     heat, position, velocity = end.error
-    return dataclasses.replace(old, time=end.stage.time), (heat, position, velocity)
+    new = dataclasses.replace(end.stage.old, time=end.stage.time)
+    return _after_impact(system, state, new, inputs), (heat, position, velocity)
+
+
+def _after_impact(system: System, old: State, new: State, inputs: Inputs) -> State:
+    """`new` with the derivative of a load that met an end stop within the step and begins to leave it again; its values stay.
+
+    An impact that comes later by dt leaves the load behind by a dt where its forces pull it away at once with an acceleration a, as at the end of a snap.
+    It comes when the load has gone the way to the stop at the speed that it had. A load that is pressed to the stop stays, and one that friction may hold.
+    """
+    load, terms = system.load, system.terms
+    assert isinstance(load, AbstractMovingLoad)
+    limits = load.limits()
+    if terms.friction or all(isinstance(end, float) and math.isinf(end) for end in limits):
+        return new
+    lower, upper = limits
+    before, motion = old.motion, new.motion
+    above = (motion.position >= upper) & (before.position < upper) & (before.velocity > 0.0)
+    below = (motion.position <= lower) & (before.position > lower) & (before.velocity < 0.0)
+    met = above | below
+    speed = jnp.where(met, before.velocity, 1.0)
+    at = (jnp.where(above, upper, lower) - before.position) / speed
+    pull = load.lever() * cross_section(system.wire) * new.wire.stress
+    still = jnp.zeros_like(motion.velocity)
+    away = (pull - load_resistance(system, new.time, motion.position, still, inputs)) / load.inertia(inputs)
+    leaves = (above & (away < 0.0)) | (below & (away > 0.0))
+    later = jnp.where(met & leaves, at - lax.stop_gradient(at), 0.0)
+    velocity = motion.velocity - lax.stop_gradient(jnp.where(leaves, away, 0.0)) * later
+    return dataclasses.replace(new, motion=dataclasses.replace(motion, velocity=velocity))
 
 
 @traced_once

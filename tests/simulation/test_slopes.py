@@ -153,6 +153,24 @@ def test_slopes_are_the_models_where_a_wire_transforms_fully() -> None:
     assert "last_position_by_payload_mass" in json.loads(found.attrs["integration_error"])["outputs"]
 
 
+def test_slopes_past_an_end_stop_have_the_shift_of_the_impact() -> None:
+    """The arm snaps, meets its upper stop and falls back: what comes after shifts with the time of the impact. Differences over a part of the time are
+    large beside the step in which the impact is."""
+    volts, by = np.linspace(8.45, 9.0, 8), ("convection_coefficient", "payload_mass")
+    measures = (Mean("position"), MeanSquare("position", 0.2, 0.1))
+    given: dict[str, Any] = {"seconds": 20.0, "keep": ("position",), "measures": measures}
+    found = run_batch(ARM, {}, grid(voltage=volts), slopes=by, **given)
+    assert float(found["position"].max()) > np.radians(94.0)
+    for name in by:
+        value = float(get_parameters(ARM, [name])[0])
+        ends = [value * (1.0 + share) for share in (-3e-3, 3e-3)]
+        ahead = run_batch(ARM, {}, grid({"voltage": volts, name: ends}), tolerance=1e-9, **given)
+        for one in measures:
+            differences = np.diff(ahead[one.name], axis=1)[:, 0] / (ends[1] - ends[0])
+            slopes = found[slope_name(one.name, name)].to_numpy()
+            np.testing.assert_allclose(slopes, differences, atol=0.03 * np.abs(differences).max())
+
+
 def test_slopes_at_a_tolerance_and_through_equal_steps_agree_where_no_branch_ends() -> None:
     given: dict[str, Any] = {"measures": (TRACKED,), "slopes": BY, "seconds": 2.0, "dt": 0.02, "keep": ()}
     along, back = (run_batch(ARM, {}, grid(voltage=[3.0, 4.0]), tolerance=one, **given) for one in (1e-7, None))

@@ -72,8 +72,7 @@ def run_batch(  # the public form: what goes inwards is a `BatchSettings`
 
     `slopes` names parameters, and inputs of `axes`: the result then has the derivative of every measure by each of them, as
     `mean_square_position_by_wire_diameter`. They are found along error-controlled steps (forward mode), at a
-    tolerance that leaves 2 % of the largest slope of the sixteen runs at most: each parameter costs about one run more, for all measures together. Past an end stop that
-    the load meets at speed they lack what the time of the impact changes. Through equal steps the derivative of
+    tolerance that leaves 2 % of the largest slope of the sixteen runs at most: each parameter costs about one run more, for all measures together. Through equal steps the derivative of
     a run that transforms fully is that of where branches end within the steps, which may have another sign. With a `tolerance` of None, and of a coupon, steps are equal, and slopes
     are found backwards through the run (reverse mode): those of one measure by all parameters together in less than four times the time of the run, in memory that grows as the square
     root of its steps. Take `dt` so small then that half of it changes them little. Those of a run that went wrong mean nothing: `good` leaves them out.
