@@ -26,7 +26,6 @@ from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.fit.uncertainty import Uncertainty, uncertainty
 from smajax.model.effects.library import LIBRARY
 from smajax.model.effects.prior_width import CoefficientPrior
-from smajax.model.system import with_mean_slopes
 
 LEAST_RUNS = 3  # two can be left out in one way only
 NORMAL_95 = 1.96
@@ -51,7 +50,7 @@ def parameters_found(job: Job, setting: Search, model: Model, start: np.ndarray,
     priors = setting.prior_records(presets=True, effects=model.effects, width_factors=model.width_factors)
     of_effects = {name: CoefficientPrior(one.mean, one.sigma, one.logarithmic) for name, one in priors.items()}
     known_before = {**of_effects, **known_before}
-    problem = own.with_system(with_mean_slopes(own.system), priors=priors).with_noise(error)
+    problem = own.with_mean_slopes().with_system(own.with_mean_slopes().system, priors=priors).with_noise(error)
     at: Sensitivity = sensitivity(problem, model.values[slots], names)
     values = {name: float(model.values[index(name)]) for name in names}
     known = uncertainty(at, names, values, job.bounds)

@@ -14,14 +14,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy  # its parts are imported when they are first used
 
 from smajax.attribution.joint_parameters import JointParameters, residual_and_columns
 from smajax.core.whiteness import correlation_time, on_samples, split_runs
-from smajax.model.system import with_mean_slopes
 
 ROUNDING = 1e-14  # of an eigenvalue of a matrix whose diagonal is one
 LONGEST = 50.0  # samples: beyond it the correlation of a residual is its own shape, and no property of a noise
@@ -92,8 +91,7 @@ def fitted_model(
     """`effects` at their fitted `values` (P,). `program`: effects of the program that computes it, these among them."""
     names = joint.free(effects)
     problem, index = joint.restricted(program)
-    problem = replace(problem, system=with_mean_slopes(problem.system))
-    residual, columns = residual_and_columns(problem, values[index], names)
+    residual, columns = residual_and_columns(problem.with_mean_slopes(), values[index], names)
     at = {name: float(values[joint.slots[name]]) for name in names}
     scales = np.asarray([joint.scale(name, at[name]) for name in names])
     matrix = np.stack([columns[name] for name in names], axis=1) * scales if names else np.zeros((len(residual), 0))

@@ -122,10 +122,10 @@ def suggestions(
     if not candidates or not names:
         return ()
     scale = np.asarray([abs(values[problem.names.index(name)]) or 1.0 for name in names])
-    at = sensitivity(problem, values, names)
+    at = sensitivity(problem.with_mean_slopes(), values, names)
     columns, priors = at.columns(names) * scale, at.prior_columns(names) * scale
     shared = [name for name in names if name in to_try.names]
-    there = sensitivity(to_try, to_try.start_values(), shared)
+    there = sensitivity(to_try.with_mean_slopes(), to_try.start_values(), shared)
     information = columns.T @ columns / inflation + priors.T @ priors + REGULARISATION * np.eye(len(names))
     before = np.sqrt(np.diag(np.linalg.inv(information)))
     ranked = []

@@ -136,5 +136,8 @@ def choose_integration(
         tried.append((choice, error))
         if error <= largest:
             return choice
-    least, most = min(error for _, error in tried), largest / MARGIN
-    return next((choice for choice, error in tried if error <= (most if least <= most else AS_GOOD * least)), ONE_STEP)
+    least, most, present = min(error for _, error in tried), largest / MARGIN, described(problem.batch.integration)
+    # A finer one was asked for: none that leaves more than the present one.
+    now = next((error for choice, error in tried if described(choice) == present), np.inf)
+    enough = most if least <= most else max(least, min(AS_GOOD * least, now))
+    return next((choice for choice, error in tried if error <= enough), ONE_STEP)

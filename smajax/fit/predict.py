@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -143,7 +144,8 @@ def _problem(
     model: ActuatorModel, likely: LikelyModel, experiment: Experiment, noise: np.ndarray, offset: tuple[bool, ...]
 ) -> Problem:
     system = model.system_of(likely.effects, likely.values)
-    batch = pack(experiment.runs, experiment.step, parameter_values(system))
+    # Without what was measured: a prediction does not know it, and a sensor that shows levels shows them.
+    batch = dataclasses.replace(pack(experiment.runs, experiment.step, parameter_values(system)), level=None)
     return Problem.build(system, batch, jnp.asarray(noise) if len(noise) > 1 else float(noise[0]), offset)
 
 

@@ -19,7 +19,7 @@ from smajax.core.parameters import by_numpy, get_parameters, parameters, set_vec
 from smajax.data.experiment.record import Prior
 from smajax.fit.packed_runs import RunBatch, predict_batch
 from smajax.fit.priors import Priors
-from smajax.model.system import System
+from smajax.model.system import System, with_mean_slopes
 
 ArrayOf = TypeVar("ArrayOf", bound=Any)
 # How near to a bound the logit that regularises a parameter is taken, as a share of the range.
@@ -111,6 +111,11 @@ class Problem(eqx.Module):
         own = self.per_run if batch is None and per_run is None else per_run
         whole = Problem.build(system, batch or self.batch, self.noise_sigma, self.offset, own, priors)
         return dataclasses.replace(whole, scale=self.scale)
+
+    def with_mean_slopes(self) -> Problem:
+        """The same with derivatives of a sensor that shows levels by what its readings tell, and not by what pulls at a fit."""
+        noise = float(np.ravel(by_numpy(self.noise_sigma))[0])
+        return dataclasses.replace(self, system=with_mean_slopes(self.system, noise))
 
     def in_first_noises(self) -> Problem:
         """The same with the misfits of every output in the unit of the first: over their own noise, times the noise of the first.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import abc
 from typing import ClassVar, NamedTuple, Self
 
-from smajax.model.types import Scalar, State
+from smajax.model.types import Scalar, Series, State
 
 FOLLOWED = "followed"  # entry of `State.sensor`: the late value, where the sensor shows another one
 
@@ -33,15 +33,15 @@ class LevelTerm(SensorTerm):
     """A sensor that shows levels: of a measured reading it is known between which two edges the motion was, and nowhere in between."""
 
     @abc.abstractmethod
-    def near(self, reading: Scalar, measured: Scalar, level: Scalar) -> Scalar:
-        """What a fit holds against `measured` where the sensor would show `reading` without its levels: the level that was measured, and how far the motion lies outside of it.
+    def near(self, reading: Series, measured: Series, level: Scalar) -> Series:
+        """What a fit holds against the samples `measured` of a run, (n,), where the sensor would show `reading` without its levels: the level that was measured, and how far the motion lies outside of it.
 
         `level`: what was measured at one of the levels; a `measured` of NaN, a missing sample: what the sensor shows.
         """
 
     @abc.abstractmethod
-    def with_mean_slope(self) -> Self:
-        """The same, with the derivative of a sensor without levels in `near`: of what readings tell in the mean, and not of what pulls at a fit."""
+    def with_mean_slope(self, noise: Scalar | float) -> Self:
+        """The same, with derivatives by what a reading tells in the mean, and not by what pulls at a fit; `noise` of a reading, in its unit."""
 
 
 class SensorTerms(NamedTuple):

@@ -105,9 +105,9 @@ def without_levels(system: System) -> tuple[System, LevelTerm | None]:
     ]
 
 
-def with_mean_slopes(system: System) -> System:
-    """`system` whose sensor's levels, if it shows any, have the derivative of their mean (`LevelTerm.with_mean_slope`)."""
-    effects = tuple(one.with_mean_slope() if isinstance(one, LevelTerm) else one for one in system.effects)
+def with_mean_slopes(system: System, noise: Scalar | float) -> System:
+    """`system` whose sensor's levels, if it shows any, have the derivative of what they tell (`LevelTerm.with_mean_slope`); `noise` of its readings."""
+    effects = tuple(one.with_mean_slope(noise) if isinstance(one, LevelTerm) else one for one in system.effects)
     return dataclasses.replace(system, effects=effects)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 
 from smajax.control.estimators.run import ReadingsWarning, estimate
 from smajax.control.presets import filter_of
+from smajax.core.parameters import set_parameters
 from smajax.model.presets import build
 from smajax.simulation.compiled import simulate_compiled
 
@@ -36,6 +38,29 @@ def test_a_gap_in_the_readings_corrects_nothing_and_spoils_nothing(name: str) ->
     filtered = memory.filter if name == "adaptive" and hasattr(memory, "filter") else memory
     spread = np.asarray(filtered.covariance)[:, 0, 0]
     assert (np.diff(spread[199:214]) > 0.0).all()  # ever less is known in the gap
+
+
+def test_every_second_reading_is_enough_to_see_that_a_branch_was_lost() -> None:
+    """Air 20 K warmer than believed: two innovations in a row that nothing explains widen the belief; a missing reading between them is no innovation."""
+    warm = set_parameters(ARM, {"ambient_temperature": 40.0})
+    true = simulate_compiled(warm, {"voltage": jnp.asarray(VOLTAGE)}, PERIOD)
+    reading = np.asarray(true.position) + NOISE * np.random.default_rng(1).standard_normal(VOLTAGE.size)
+    thinned = np.where(np.arange(reading.size) % 2 == 1, np.nan, reading)
+    off = [
+        np.std(
+            np.asarray(estimate(filter_of("adaptive", ARM, NOISE), one, VOLTAGE, PERIOD)[1].position - true.position)
+        )
+        for one in (reading, thinned)
+    ]
+    assert off[1] < 2.0 * off[0]
+
+
+def test_a_filter_may_be_traced_with_a_log_at_hand() -> None:
+    ekf = filter_of("model", ARM, NOISE)
+    found = eqx.filter_jit(lambda one: estimate(one, jnp.asarray(READING), jnp.asarray(VOLTAGE), PERIOD)[1].position)(
+        ekf
+    )
+    np.testing.assert_allclose(found, estimate(ekf, READING, VOLTAGE, PERIOD)[1].position, atol=1e-9)
 
 
 def test_a_log_that_begins_with_a_gap_and_a_filter_that_needs_every_reading_are_refused() -> None:

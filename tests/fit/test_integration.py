@@ -85,6 +85,7 @@ def test_one_step_a_sample_is_chosen_when_it_is_accurate_enough() -> None:
         ([3.0, 0.2, 0.09, 0.08, 0.07, 0.06, 0.06], 2),  # less than a tenth of the noise, if not by half
         ([3.0, 0.2, 0.04, 0.01, 0.01, 0.01, 0.01], 2),
         ([np.inf] * 7, 0),
+        ([0.21, 0.20, 0.19, 0.18, 0.15, 0.12, 0.11], 0),
     ],
 )
 def test_the_cheapest_of_those_that_are_about_as_good_is_chosen(
@@ -95,6 +96,16 @@ def test_the_cheapest_of_those_that_are_about_as_good_is_chosen(
     monkeypatch.setattr(integration, "_error", lambda *_: SimpleNamespace(share=next(given)))
     found = choose_integration(problem, problem.system)
     assert described(found) == described([ONE_STEP, *(Integration(substeps=2**k) for k in range(1, 7))][chosen])
+
+
+def test_one_that_is_asked_for_because_the_present_one_leaves_too_much_leaves_no_more(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    given = iter([0.21, 0.20, 0.19, 0.18, 0.15, 0.12, 0.11])
+    problem = with_integration(_problem("coupon", 0.1), Integration(substeps=32))
+    monkeypatch.setattr(integration, "_predicted", lambda *_: np.zeros(()))
+    monkeypatch.setattr(integration, "_error", lambda *_: SimpleNamespace(share=next(given)))
+    assert described(choose_integration(problem, problem.system)) == "32 steps a sample"
 
 
 @pytest.mark.slow  # that the error is below a tenth of the noise is above

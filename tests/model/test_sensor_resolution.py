@@ -37,9 +37,12 @@ def test_its_derivatives_are_those_of_the_mean() -> None:
 
 
 def _near(x: Any, measured: Any, level: float = ZERO, **changed: Any) -> Any:
-    return SensorResolution(**({"share": 1.0, "increment": INCREMENT, "zero": ZERO} | changed)).near(
-        x, measured, jnp.asarray(level)
-    )
+    """Of a run, or of one sample in a run that otherwise rests in the middle of a level."""
+    sensor = SensorResolution(**({"share": 1.0, "increment": INCREMENT, "zero": ZERO} | changed))
+    if np.ndim(measured):
+        return sensor.near(x, measured, jnp.asarray(level))
+    rest = jnp.full(20, ZERO)
+    return sensor.near(jnp.append(rest, x), jnp.append(rest, measured), jnp.asarray(level))[-1]
 
 
 def test_of_a_measured_level_it_is_known_between_which_edges_the_motion_was() -> None:
@@ -55,15 +58,26 @@ def test_of_a_measured_level_it_is_known_between_which_edges_the_motion_was() ->
     assert float(_near(high + 4e-4, np.nan)) == float(_shown(high + 4e-4))
 
 
-def test_levels_are_counted_from_one_that_was_read_so_that_a_run_may_have_a_zero_of_its_own() -> None:
-    """The reading of a run that lies 0.45 of an increment higher: by its distance from the model's levels every fifth sample would be a level off."""
+@pytest.mark.parametrize("own", [0.45, 0.55, 3.2, -8.6])
+def test_a_run_may_have_a_zero_of_its_own_of_any_size(own: float) -> None:
+    """In increments. By its distance from the model's levels every fifth sample was a level off from 0.45 on, and from 0.5 on all were outside."""
     random = np.random.default_rng(3)
     x = np.linspace(-0.01, 0.01, 400)
-    own = 0.45 * INCREMENT
-    measured = np.asarray(_shown(x)) + own + 0.05 * INCREMENT * random.standard_normal(x.size)
-    level = commonest(measured)
-    np.testing.assert_allclose(_near(x, measured, level), _shown(x), atol=1e-12)
-    assert abs((level - own - ZERO) / INCREMENT - round((level - own - ZERO) / INCREMENT)) < 0.1
+    measured = np.asarray(_shown(x)) + own * INCREMENT + 0.05 * INCREMENT * random.standard_normal(x.size)
+    measured[::37] = np.nan
+    near = np.asarray(_near(x, measured, commonest(measured)))
+    np.testing.assert_allclose(near, _shown(x), atol=1e-12)
+    # Nor does a model that is a little off take the next levels for its own.
+    off = np.asarray(_near(x + 0.1 * INCREMENT, measured, commonest(measured)))
+    assert np.abs(off - near)[np.isfinite(measured)].max() < 0.11 * INCREMENT
+
+
+def test_the_increment_is_that_of_the_log() -> None:
+    """How far a motion lies outside of levels as wide as one likes is nothing: a free increment took up whatever else was missing."""
+    bounds = SensorResolution.candidate.bounds(Extent(20.0, 0.02, 1e-3, noise=1e-4))
+    assert list(bounds) == ["increment"]
+    assert bounds["increment"] == pytest.approx((1e-3 / 1.0125, 1.0125e-3))  # 20 levels over the stroke
+    assert SensorResolution.candidate.bounds(Extent(20.0, 0.02, 0.0, noise=1e-4)) == {}
 
 
 def test_the_reading_about_which_most_lie_is_found_among_levels_and_noise() -> None:
@@ -77,11 +91,14 @@ def test_the_reading_about_which_most_lie_is_found_among_levels_and_noise() -> N
     assert commonest(np.asarray([4.0])) == 4.0
 
 
-def test_a_fit_is_pulled_by_samples_outside_of_their_level_and_evidence_counts_all() -> None:
+def test_a_fit_is_pulled_by_samples_outside_of_their_level_and_evidence_counts_what_they_tell() -> None:
+    """A reading of a level has the level's variance beside that of its noise: q^2/12."""
     measured = ZERO + 3 * INCREMENT
+    noise = INCREMENT / 10.0
 
     def near(x: Any, sensor: SensorResolution) -> Any:
-        return sensor.near(x, jnp.asarray(measured), jnp.asarray(measured))
+        rest = jnp.full(20, measured)
+        return sensor.near(jnp.append(rest, x), jnp.append(rest, measured), jnp.asarray(measured))[-1]
 
     def slope(x: float, sensor: SensorResolution) -> float:
         return float(jax.grad(near)(x, sensor))
@@ -89,9 +106,13 @@ def test_a_fit_is_pulled_by_samples_outside_of_their_level_and_evidence_counts_a
     sensor = SensorResolution(share=1.0, increment=INCREMENT, zero=ZERO)
     assert slope(measured + 0.4 * INCREMENT, sensor) == pytest.approx(WITHIN)
     assert slope(measured + 0.6 * INCREMENT, sensor) == pytest.approx(1.0)
+    told = sensor.with_mean_slope(noise)
+    assert slope(measured + 0.4 * INCREMENT, told) == pytest.approx((1.0 + 100.0 / 12.0) ** -0.5)
+    assert float(jax.grad(lambda x: told.sensed(x, jnp.zeros(()), x))(0.3 * INCREMENT)) == pytest.approx(
+        (1.0 + 100.0 / 12.0) ** -0.5
+    )
     for x in (measured + 0.4 * INCREMENT, measured + 0.6 * INCREMENT):
-        assert slope(x, sensor.with_mean_slope()) == pytest.approx(1.0)
-        assert float(near(x, sensor)) == float(near(x, sensor.with_mean_slope()))
+        assert float(near(x, sensor)) == float(near(x, told))
 
 
 def test_a_stair_within_the_noise_is_not_looked_for() -> None:

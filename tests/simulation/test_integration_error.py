@@ -123,7 +123,7 @@ def test_a_batch_takes_one_step_a_sample_where_that_is_enough() -> None:
 
 
 @pytest.mark.slow
-def test_slopes_of_a_coarse_clock_are_found_through_equal_steps() -> None:
+def test_slopes_of_a_coarse_clock_are_found_along_error_controlled_steps() -> None:
     clock, wanted = 5.0 * CLOCK, jnp.linspace(-0.7, 0.5, 41)
     settings: dict[str, Any] = {
         "keep": (),
@@ -133,8 +133,7 @@ def test_slopes_of_a_coarse_clock_are_found_through_equal_steps() -> None:
     inputs, axes = {"voltage": jnp.asarray(ON_AND_OFF)}, grid(payload_mass=[0.05, 0.06])
     found = run_batch(arm(), inputs, axes, dt=clock, **settings)
     how = json.loads(found.attrs["integration"])
-    assert how["tolerance"] is None
-    assert how["substeps"] > 1
+    assert how["tolerance"] is not None
     name, step = "mean_square_position_by_convection_coefficient", 1e-3
     base = parameter_values(arm())["convection_coefficient"]
     plain: dict[str, Any] = {"keep": (), "measures": settings["measures"], "tolerance": 1e-7}
@@ -143,7 +142,7 @@ def test_slopes_of_a_coarse_clock_are_found_through_equal_steps() -> None:
         for h in (step * base, -step * base)
     )
     expected = (above["mean_square_position"] - below["mean_square_position"]) / (2.0 * step * base)
-    np.testing.assert_allclose(found[name], expected, rtol=0.06)  # the value is what is controlled
+    np.testing.assert_allclose(found[name], expected, rtol=0.03)
 
 
 def test_a_batch_on_disk_keeps_the_integration_that_it_was_begun_with(tmp_path: Path) -> None:

@@ -76,7 +76,7 @@ def _same_as_forward(
 @pytest.mark.slow
 def test_reverse_mode_slopes_agree_with_forward_mode() -> None:
     axes = sampled(13, voltage=(5.5, 8.5), payload_mass=(0.05, 0.09), seed=1)
-    _same_as_forward(ARM, {}, axes, (TRACKED, Mean("temperature")), BY, seconds=2.0, dt=0.02)
+    _same_as_forward(ARM, {}, axes, (TRACKED, Mean("temperature")), BY, seconds=2.0, dt=0.02, tolerance=None)
 
 
 def test_slopes_agree_with_differences() -> None:

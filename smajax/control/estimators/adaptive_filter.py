@@ -22,7 +22,7 @@ from jaxtyping import Array, Bool, Float
 from smajax.control.estimators.base import AbstractEstimator
 from smajax.control.estimators.believed_state import advanced, vector_of, with_vector
 from smajax.control.estimators.kalman import Belief, Innovation, Matrix, Vector, corrected
-from smajax.control.estimators.model_filter import ModelFilter, none_yet, unexplained
+from smajax.control.estimators.model_filter import ModelFilter, none_yet, remembered, unexplained
 from smajax.control.measured_state import MeasuredState, truth
 from smajax.core.limited import limited
 from smajax.core.parameters import get_parameters, parameter, set_vector
@@ -95,6 +95,7 @@ class AdaptiveFilter(AbstractEstimator):
         logarithms = limited(belief.mean[STATES:], -LARGEST, LARGEST)
         system = self.believed(logarithms)
         lost = unexplained(last, innovation) & ~transforming
+        innovation = remembered(last, innovation, reading)
         state = self.filter.consistent(system, state, belief.mean[:STATES], transforming, lost)
         covariance = self.filter.widened(belief.covariance, lost)
         return AdaptiveFilterMemory(state, logarithms, covariance, innovation), truth(state)

@@ -54,6 +54,12 @@ def none_yet(reading: Scalar) -> Innovation:
     return Innovation(jnp.zeros_like(reading), jnp.ones_like(reading))
 
 
+def remembered(last: Innovation, now: Innovation, reading: Scalar) -> Innovation:
+    """The innovation that the next one is held against: a missing reading has none."""
+    missing = jnp.isnan(reading)
+    return Innovation(jnp.where(missing, last.value, now.value), jnp.where(missing, last.variance, now.variance))
+
+
 def unexplained(last: Innovation, now: Innovation) -> Bool[Array, ""]:
     """Whether two innovations in a row are beyond `UNEXPLAINED` standard deviations on the same side."""
     both = jnp.minimum(last.value**2 / last.variance, now.value**2 / now.variance) > UNEXPLAINED**2
@@ -135,6 +141,7 @@ class ModelFilter(AbstractEstimator):
         position = jnp.zeros_like(belief.mean).at[0].set(1.0)
         belief, innovation = corrected(belief, reading, position, self.reading_noise**2)
         lost = unexplained(last, innovation) & ~transforming
+        innovation = remembered(last, innovation, reading)
         state = self.consistent(self.system, state, belief.mean, transforming, lost)
         return ModelFilterMemory(state, self.widened(belief.covariance, lost), innovation), truth(state)
 

@@ -32,8 +32,9 @@ def estimate(
     """(memory, estimate) at every sample of `readings`, arrays of shape (n, ...); samples are `period` seconds apart.
 
     `voltages[i]` was held from sample i to sample i + 1, as in `simulate`; the last one is not used. A reading of NaN is a
-    missing one, which corrects nothing. Raises ValueError when the two series are not of one length, where the first reading is missing, and for a missing
-    one with the filter `printed`, which takes rates from readings. A ReadingsWarning says of readings that the load cannot have: SI, an angle in rad.
+    missing one, which corrects nothing. A ReadingsWarning says of readings that the load cannot have: SI, an angle in rad. Raises
+    ValueError when the two series are not of one length, where the first reading is missing, and for a missing one with the filter
+    `printed`, which takes rates from readings.
     """
     readings, voltages = jnp.asarray(readings, dtype=float), jnp.asarray(voltages, dtype=float)
     if readings.shape != voltages.shape or readings.ndim != 1:
@@ -67,7 +68,10 @@ def _check(estimator: AbstractEstimator, readings: Series) -> None:
     load = believed.system.load if isinstance(believed, ModelFilter | PrintedFilter) else None
     if not isinstance(load, AbstractMovingLoad):
         return
-    low, high = sorted(float(load.sensed(jnp.asarray(end))) for end in load.limits())
+    ends = [load.sensed(jnp.asarray(end)) for end in load.limits()]
+    if any(isinstance(end, jax.core.Tracer) for end in ends):
+        return
+    low, high = sorted(float(end) for end in ends)
     least, most = float(np.nanmin(values)), float(np.nanmax(values))
     room, unit = BEYOND * (high - low), load.reading[1]
     if np.isfinite(room) and (least < low - room or most > high + room):

@@ -13,10 +13,11 @@ from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
 from smajax.model.effects.candidate import Candidate, Extent, Width
 from smajax.model.sensor_reading import LevelTerm
-from smajax.model.types import Scalar
+from smajax.model.types import Scalar, Series
 
 PHASES = 12
 COARSE = 3.0  # noises
+KNOWN = 0.25  # of a level, over the stroke: how well the increment is read off the log
 # Slope within a level in a fit, against 1 outside: by more of it a fit takes the noise of readings there for something to follow, and stops a twentieth of
 # the noise above the least squares; with none the normal equations are singular where no sample lies outside of its level.
 WITHIN = 0.05
@@ -25,6 +26,15 @@ WITHIN = 0.05
 def _observable(extent: Extent) -> bool:
     # A finer stair is within the noise, and its edges, by which a fit goes, are not to be seen in it.
     return extent.increment > COARSE * extent.noise
+
+
+def _bounds(extent: Extent) -> dict[str, tuple[float, float]]:
+    # How far a motion lies outside of levels that are as wide as one likes is nothing: a free increment would take up whatever else is missing.
+    step = extent.increment
+    if not step > 0.0:
+        return {}
+    about = 1.0 + KNOWN * step / extent.stroke
+    return {"increment": (step / about, step * about)}
 
 
 def _grid(extent: Extent) -> tuple[dict[str, float], ...]:
@@ -37,8 +47,9 @@ class SensorResolution(AbstractEffect, LevelTerm):
     r"""$y = (1 - s)\,x + s\,\{z + q\,\mathrm{round}[(x - z)/q]\}$; a share s of one is the staircase itself.
 
     A fit holds against a measured level how far the motion lies outside of it (`near`), and not the next level: a motion that is a hair late at an edge
-    is off by a hair, and not by a whole increment, which outweighed all that the other samples say. Within the level nothing pulls at the motion. Standard errors
-    and evidence are those of a sensor without a stair (`with_mean_slope`); a coarse stair tells less than that.
+    is off by a hair, and not by a whole increment, which outweighed all that the other samples say. Within the level nothing pulls at the motion. Of a run levels are
+    counted from one of its own, and which of the model's that is follows from the run as a whole: the one with which the motion lies least outside. Standard errors
+    and evidence are those of readings with the variance of a level beside their noise (`with_mean_slope`).
     """
 
     share: Scalar = parameter("-", 0.0, 1.0, "s: share of the staircase in the reading", default=0.0)
@@ -55,6 +66,7 @@ class SensorResolution(AbstractEffect, LevelTerm):
     )
 
     within: Scalar = eqx.field(converter=jnp.asarray, default=WITHIN)
+    mean: Scalar = eqx.field(converter=jnp.asarray, default=1.0)  # slope of the reading where nothing was measured
 
     effect_name: ClassVar[str] = "sensor_resolution"
     candidate: ClassVar[Candidate] = Candidate(
@@ -66,6 +78,7 @@ class SensorResolution(AbstractEffect, LevelTerm):
         switches=("share",),
         initial_guess={"share": 0.9, "increment": 1e-3, "zero": 0.0},
         observable=_observable,
+        bounds=_bounds,
         grid=_grid,
         prior_class="bench",
         widths={
@@ -77,21 +90,26 @@ class SensorResolution(AbstractEffect, LevelTerm):
 
     def sensed(self, reading: Scalar, time: Scalar, last: Scalar) -> Scalar:
         steps = (reading - self.zero) / self.increment
-        return self._shown(reading, steps, _nearest(steps), 0.0, 1.0)
+        return self._shown(reading, steps, _nearest(steps), 0.0, self.mean)
 
-    def near(self, reading: Scalar, measured: Scalar, level: Scalar) -> Scalar:
+    def near(self, reading: Series, measured: Series, level: Scalar) -> Series:
         steps = (reading - self.zero) / self.increment
-        missing = jnp.isnan(measured)
-        # Counted from one level, since each run has a zero of its own.
-        known = _nearest((level - self.zero) / self.increment)
-        number = known + _nearest((jnp.where(missing, level, measured) - level) / self.increment)
-        number = jnp.where(missing, _nearest(steps), number)
-        above, below = steps - number - 0.5, steps - number + 0.5
-        outside = jnp.where(above > 0.0, above, jnp.where(below < 0.0, below, 0.0))
-        return self._shown(reading, steps, number, outside, self.within)
+        fixed, missing = jax.lax.stop_gradient(steps), jnp.isnan(measured)
+        counted = _nearest((jnp.where(missing, level, measured) - level) / self.increment)
+        # The run may have a zero of its own, of any size: its levels are those of the model but for a whole number.
+        present = jnp.where(missing, 0.0, 1.0)
+        about = _nearest(jnp.sum(present * (fixed - counted)) / jnp.maximum(jnp.sum(present), 1.0))
+        numbers = [about - 1.0, about, about + 1.0]
+        costs = [jnp.sum(present * _outside(fixed - counted - number) ** 2) for number in numbers]
+        least = jnp.minimum(costs[0], jnp.minimum(costs[1], costs[2]))
+        first = jnp.where(costs[1] <= least, numbers[1], jnp.where(costs[0] <= least, numbers[0], numbers[2]))
+        number = jnp.where(missing, _nearest(steps), counted + first)
+        within = jnp.where(missing, self.mean, self.within)
+        return self._shown(reading, steps, number, _outside(steps - number), within)
 
-    def with_mean_slope(self) -> Self:
-        return dataclasses.replace(self, within=jnp.ones_like(self.within))
+    def with_mean_slope(self, noise: Scalar | float) -> Self:
+        mean = 1.0 / jnp.sqrt(1.0 + self.increment**2 / (12.0 * noise**2))
+        return dataclasses.replace(self, within=jnp.asarray(mean), mean=jnp.asarray(mean))
 
     def _shown(
         self, reading: Scalar, steps: Scalar, number: Scalar, outside: Scalar | float, within: Scalar | float
@@ -100,6 +118,11 @@ class SensorResolution(AbstractEffect, LevelTerm):
         along = within * (steps - jax.lax.stop_gradient(steps))
         level = number + jnp.where(outside == 0.0, along, outside)
         return reading + self.share * (self.zero + self.increment * level - reading)
+
+
+def _outside(steps: Scalar) -> Scalar:
+    """How far a motion lies outside of the level from -1/2 to 1/2."""
+    return jnp.where(steps > 0.5, steps - 0.5, jnp.where(steps < -0.5, steps + 0.5, 0.0))
 
 
 def _nearest(steps: Scalar) -> Scalar:
