@@ -50,7 +50,8 @@ def parameters_found(job: Job, setting: Search, model: Model, start: np.ndarray,
     priors = setting.prior_records(presets=True, effects=model.effects, width_factors=model.width_factors)
     of_effects = {name: CoefficientPrior(one.mean, one.sigma, one.logarithmic) for name, one in priors.items()}
     known_before = {**of_effects, **known_before}
-    problem = own.with_mean_slopes().with_system(own.with_mean_slopes().system, priors=priors).with_noise(error)
+    told = own.with_mean_slopes()
+    problem = told.with_system(told.system, priors=priors).with_noise(error)
     at: Sensitivity = sensitivity(problem, model.values[slots], names)
     values = {name: float(model.values[index(name)]) for name in names}
     known = uncertainty(at, names, values, job.bounds)

@@ -18,6 +18,7 @@ from smajax.control.compiled_loop import measured_loop
 from smajax.control.controllers.base import AbstractController
 from smajax.control.estimators.base import AbstractEstimator
 from smajax.control.measured_state import Sensor
+from smajax.control.position_unit import beyond_ends
 from smajax.control.reference import Reference
 from smajax.control.reference_file import reference_of
 from smajax.control.signal_path import check_interface
@@ -128,12 +129,10 @@ def simulate_loop_dataset(
 
 
 def _warn_beyond_stops(load: AbstractMovingLoad, wanted: Reference) -> None:
-    low, high = (float(one) for one in load.limits())
-    least, most = float(np.min(wanted.position)), float(np.max(wanted.position))
-    room, unit = (BEYOND * (high - low) if np.isfinite(high - low) else 0.0), load.reading[1]
-    if least < low - room or most > high + room:
+    (low, high), unit = map(float, load.limits()), load.reading[1]
+    if beyond := beyond_ends(wanted.position, (low, high), BEYOND):
         warnings.warn(
-            f"the set point goes from {least:.4g} to {most:.4g} {unit}, and the load between its end stops from {low:.4g} to {high:.4g} {unit}: "
+            f"the set point goes from {beyond[0]:.4g} to {beyond[1]:.4g} {unit}, and the load between its end stops from {low:.4g} to {high:.4g} {unit}: "
             f"a number is in {unit}; of another unit give text (`'60 deg'`).",
             SetPointWarning,
             stacklevel=3,

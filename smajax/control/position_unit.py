@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Array
 
 from smajax.control.figures_of_merit import BAND_DEGREES, band_of
 from smajax.control.load_equation import moving_load, stroke_of
@@ -90,6 +91,14 @@ def check_unit(system: System, given: PositionUnit) -> None:
 def unit_named(shown: str, command: str = "V") -> PositionUnit:
     """`deg` or `mm`; another one is that of a load of one's own."""
     return PositionUnit(shown, {"deg": "rad", "mm": "m"}.get(shown, shown), command)
+
+
+def beyond_ends(values: Array | np.ndarray, ends: tuple[float, float], share: float) -> tuple[float, float] | None:
+    """(least, most) of `values` that lie beyond the ends by more than that share of the way between them, which is nothing where an end is open; else None."""
+    low, high = ends
+    least, most = float(np.nanmin(values)), float(np.nanmax(values))
+    room = share * (high - low) if np.isfinite(high - low) else 0.0
+    return (least, most) if least < low - room or most > high + room else None
 
 
 def position_range(system: System) -> tuple[float, float]:

@@ -21,7 +21,7 @@ from smajax.engine import Along, Program, by_machine_code, program
 from smajax.fit.needed_directions import NeededDirections
 from smajax.fit.packed_runs import predict_run
 from smajax.fit.problem import Problem
-from smajax.model.system import System, without_levels
+from smajax.model.system import System
 from smajax.model.types import Series
 from smajax.simulation.steppers import Integration
 
@@ -57,7 +57,7 @@ def _runs(problem: Problem) -> list[_Run]:
     inputs = {name: np.asarray(series) for name, series in batch.inputs.items()}
     overrides, dt = np.asarray(batch.overrides), np.asarray(batch.dt, dtype=float)
     names = problem.shared, batch.override_names, problem.per_run.names, batch.outputs
-    seen = None if without_levels(problem.system)[1] is None else batch.seen
+    seen = batch.seen_by(problem.system)
     return [
         _Run(
             problem.system,

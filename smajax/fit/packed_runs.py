@@ -48,17 +48,15 @@ class RunBatch(eqx.Module):
     # What was measured at one of the levels of a sensor that shows levels; None of runs that nobody has measured.
     level: Float[Array, " series"] | None = None
 
-    @property
-    def seen(self) -> Seen | None:
-        """What was measured, for a sensor that shows levels."""
-        if self.level is None:
+    def seen_by(self, system: System) -> Seen | None:
+        """What was measured; None where no sensor of `system` shows levels."""
+        if self.level is None or without_levels(system)[1] is None:
             return None
-        shape, known = (self.runs, len(self.outputs)), (self.mask, self.output, self.level)
-        if any(isinstance(one, jax.core.Tracer) for one in known):
-            samples: Any = jnp.where(self.mask > 0, self.output, jnp.nan)
-            return Seen(samples.reshape(*shape, -1), self.level.reshape(shape))
-        mask, output, level = map(np.asarray, known)
-        return Seen(np.where(mask > 0, output, np.nan).reshape(*shape, -1), level.reshape(shape))
+        known = not any(isinstance(one, jax.core.Tracer) for one in (self.mask, self.output, self.level))
+        own: Any = np if known else jnp
+        mask, output, level = map(own.asarray, (self.mask, self.output, self.level))
+        shape = self.runs, len(self.outputs)
+        return Seen(own.where(mask > 0, output, own.nan).reshape(*shape, -1), level.reshape(shape))
 
     @property
     def runs(self) -> int:
@@ -186,7 +184,8 @@ def _compiled_runs(
     system: System, batch: RunBatch, names: Sequence[str], values: np.ndarray, shown: bool = True
 ) -> Iterator[tuple[Trajectory, list[np.ndarray]]]:
     """Of each run, with its `values` (R, names): its trajectory, and what its sensors show, where that is asked for."""
-    series, seen = {name: np.asarray(one) for name, one in batch.inputs.items()}, batch.seen if shown else None
+    series = {name: np.asarray(one) for name, one in batch.inputs.items()}
+    seen = batch.seen_by(system) if shown else None
     for number in range(batch.runs):
         inputs = {name: jnp.asarray(one[number]) for name, one in series.items()}
         own = None if seen is None else (seen.samples[number], seen.level[number])
@@ -240,6 +239,6 @@ def predict_batch(
     names = (*batch.override_names, *more_names)
     values = batch.overrides if more is None else jnp.concatenate([batch.overrides, more], axis=1)
     one = partial(predict_run, system, names=names, dt=batch.dt, outputs=batch.outputs, integration=batch.integration)
-    seen = batch.seen
+    seen = batch.seen_by(system)
     predicted = jax.vmap(lambda inputs, row, own: one(inputs, row, seen=own))(batch.inputs, values, seen)
     return predicted.reshape(batch.output.shape[0], -1)

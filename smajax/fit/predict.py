@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -145,7 +144,7 @@ def _problem(
 ) -> Problem:
     system = model.system_of(likely.effects, likely.values)
     # Without what was measured: a prediction does not know it, and a sensor that shows levels shows them.
-    batch = dataclasses.replace(pack(experiment.runs, experiment.step, parameter_values(system)), level=None)
+    batch = replace(pack(experiment.runs, experiment.step, parameter_values(system)), level=None)
     return Problem.build(system, batch, jnp.asarray(noise) if len(noise) > 1 else float(noise[0]), offset)
 
 

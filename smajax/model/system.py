@@ -100,9 +100,8 @@ def without_levels(system: System) -> tuple[System, LevelTerm | None]:
     levels = [one for one in system.effects if isinstance(one, LevelTerm)]
     if not levels:
         return system, None
-    return dataclasses.replace(system, effects=tuple(one for one in system.effects if one is not levels[-1])), levels[
-        -1
-    ]
+    last = levels[-1]
+    return dataclasses.replace(system, effects=tuple(one for one in system.effects if one is not last)), last
 
 
 def with_mean_slopes(system: System, noise: Scalar | float) -> System:

@@ -40,6 +40,7 @@ from smajax.model.types import Inputs, Motion, Scalar, State, WireState
 from smajax.model.wire.constitutive import reached, stress_at
 from smajax.model.wire.heat import cross_section, stored_heat
 from smajax.model.wire.history import over, with_step_to
+from smajax.model.wire.kinetics import Branch
 from smajax.model.wire.root import root
 from smajax.model.wire.two_populations import choose_branch, curve_on, open_branches, settled, with_amplitudes
 from smajax.simulation.stage_equations import Stage, Unknowns, beyond_stops, equations, motion_rates
@@ -236,6 +237,11 @@ def _after_impact(system: System, old: State, new: State, inputs: Inputs) -> Sta
     return dataclasses.replace(new, motion=dataclasses.replace(motion, velocity=velocity))
 
 
+def _root_on(branch: Branch, before: Scalar, miss: Callable[[Scalar], Scalar]) -> Scalar:
+    """The fraction at which `miss`, which rises, is zero: between that before the step and the end of the branch."""
+    return root(miss, before, jnp.where(branch.heating, 0.0, before), jnp.where(branch.cooling, 1.0, before))
+
+
 @traced_once
 def _coupon_step(system: System, state: State, inputs: Inputs, dt: Scalar) -> State:
     """Temperature and stress at the end of the step are prescribed: the fraction follows in closed form, or of a range that it moves as a root."""
@@ -244,8 +250,7 @@ def _coupon_step(system: System, state: State, inputs: Inputs, dt: Scalar) -> St
     law, changed, at, before = wire.kinetics, terms.kinetics, (temperature, stress), old.martensite_fraction
     branch = choose_branch(law, changed, old, open_branches(law, changed, old), *at)
     if changed.move_within_step:
-        low, high = jnp.where(branch.heating, 0.0, before), jnp.where(branch.cooling, 1.0, before)
-        xi = root(lambda to: to - curve_on(law, changed, with_step_to(to, old), branch, *at), before, low, high)
+        xi = _root_on(branch, before, lambda to: to - curve_on(law, changed, with_step_to(to, old), branch, *at))
     else:
         xi = curve_on(law, changed, old, branch, *at)
     ranges = with_step_to(xi, old)
@@ -274,9 +279,7 @@ def _strain_coupon_step(system: System, state: State, inputs: Inputs, dt: Scalar
     def miss(xi: Scalar) -> Scalar:
         return xi - curve_on(law, changed, with_step_to(xi, old), branch, temperature, stress_of(xi))
 
-    low = jnp.where(branch.heating, 0.0, before)
-    high = jnp.where(branch.cooling, 1.0, before)
-    xi = root(miss, before, low, high)
+    xi = _root_on(branch, before, miss)
     ranges = with_step_to(xi, old)
     xi, parts = settled(law, changed, ranges, branch, temperature, stress_of(xi), xi)
     new = reached(wire, terms.constitutive, old, temperature, stress_of(xi), xi)

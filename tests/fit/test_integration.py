@@ -77,10 +77,8 @@ def test_one_step_a_sample_is_chosen_when_it_is_accurate_enough() -> None:
 @pytest.mark.parametrize(
     ("errors", "chosen"),
     [
-        (
-            [6.065, 6.064, 6.0, 5.9, 6.1, 6.2, 5.99],
-            0,
-        ),  # no step length settles a jump: seven times the time for nothing
+        # No step length settles a jump: seven times the time for nothing.
+        ([6.065, 6.064, 6.0, 5.9, 6.1, 6.2, 5.99], 0),
         ([3.0, 1.1, 0.9, 0.7, 0.6, 0.55, 0.5], 2),
         ([3.0, 0.2, 0.09, 0.08, 0.07, 0.06, 0.06], 2),  # less than a tenth of the noise, if not by half
         ([3.0, 0.2, 0.04, 0.01, 0.01, 0.01, 0.01], 2),

@@ -82,11 +82,8 @@ def test_an_event_needs_more_evidence_than_a_bench_and_a_bench_more_than_a_mater
     [
         ("latent_heat", "enthalpy", CoefficientPrior(0.0, 2e4, False)),  # by itself
         ("sensor_offset", "shift", CoefficientPrior(0.0, 0.01 * 0.02, False)),  # of the stroke
-        (
-            "sensor_resolution",
-            "increment",
-            CoefficientPrior(1e-3, 0.01242252, True),
-        ),  # of the increment, within half of its bounds
+        # Of the increment, and half of its bounds.
+        ("sensor_resolution", "increment", CoefficientPrior(1e-3, 0.01242252, True)),
         ("draught", "time", CoefficientPrior(10.0, 10.0, False)),  # of a run
         ("ambient_drift", "rate", CoefficientPrior(0.0, 2.0 / 20.0, False)),  # one over a run
         ("sensor_drift", "rate", CoefficientPrior(0.0, 0.01 * 0.02 / 20.0, False)),  # the stroke over a run

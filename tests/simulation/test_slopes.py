@@ -131,10 +131,8 @@ def test_slopes_are_streamed_to_disk_and_resumed(tmp_path: Path) -> None:
 
 def test_slopes_are_the_models_where_a_wire_transforms_fully() -> None:
     """Those through equal steps of 5 ms had the wrong sign in a seventh of these runs, and differences of the same runs agreed with them."""
-    volts, by = (
-        np.linspace(7.4, 8.0, 25),
-        ("convection_coefficient", "payload_mass"),
-    )  # from 8.3 V on it meets its end stop
+    volts = np.linspace(7.4, 8.0, 25)  # from 8.3 V on it meets its end stop
+    by = ("convection_coefficient", "payload_mass")
     about = {name: float(get_parameters(ARM, [name])[0]) for name in by}
     measures = (Last("position"), Mean("position"))
     found = run_batch(ARM, {}, grid(voltage=volts), seconds=20.0, keep=(), measures=measures, slopes=by)

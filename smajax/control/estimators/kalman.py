@@ -51,8 +51,7 @@ def corrected(belief: Belief, reading: Scalar, seen: Vector, reading_variance: S
     """
     seen_with = belief.covariance @ seen
     missing = jnp.isnan(reading)
-    off = jnp.where(missing, 0.0, jnp.where(missing, 0.0, reading) - seen @ belief.mean)
-    innovation = Innovation(off, seen @ seen_with + reading_variance)
+    innovation = Innovation(jnp.where(missing, 0.0, reading - seen @ belief.mean), seen @ seen_with + reading_variance)
     gain = jnp.where(missing, 0.0, seen_with / innovation.variance)
     complement = jnp.eye(seen.size, dtype=seen.dtype) - jnp.outer(gain, seen)
     covariance = symmetric(complement @ belief.covariance @ complement.T + reading_variance * jnp.outer(gain, gain))

@@ -14,6 +14,7 @@ from smajax.control.estimators.base import AbstractEstimator
 from smajax.control.estimators.model_filter import ModelFilter
 from smajax.control.estimators.printed_filter import PrintedFilter
 from smajax.control.measured_state import MeasuredState
+from smajax.control.position_unit import beyond_ends
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.types import Scalar, Series
 from smajax.simulation.integrate import Carry, Schedule, integrate
@@ -72,11 +73,10 @@ def _check(estimator: AbstractEstimator, readings: Series) -> None:
     if any(isinstance(end, jax.core.Tracer) for end in ends):
         return
     low, high = sorted(float(end) for end in ends)
-    least, most = float(np.nanmin(values)), float(np.nanmax(values))
-    room, unit = BEYOND * (high - low), load.reading[1]
-    if np.isfinite(room) and (least < low - room or most > high + room):
+    unit = load.reading[1]
+    if np.isfinite(high - low) and (beyond := beyond_ends(values, (low, high), BEYOND)):
         warnings.warn(
-            f"`readings` go from {least:.4g} to {most:.4g} {unit}, and the load from {low:.4g} to {high:.4g} {unit}: are they in {unit}?",
+            f"`readings` go from {beyond[0]:.4g} to {beyond[1]:.4g} {unit}, and the load from {low:.4g} to {high:.4g} {unit}: are they in {unit}?",
             ReadingsWarning,
             stacklevel=3,
         )

@@ -99,11 +99,11 @@ class SensorResolution(AbstractEffect, LevelTerm):
         # The run may have a zero of its own, of any size: its levels are those of the model but for a whole number.
         present = jnp.where(missing, 0.0, 1.0)
         about = _nearest(jnp.sum(present * (fixed - counted)) / jnp.maximum(jnp.sum(present), 1.0))
-        numbers = [about - 1.0, about, about + 1.0]
-        costs = [jnp.sum(present * _outside(fixed - counted - number) ** 2) for number in numbers]
-        least = jnp.minimum(costs[0], jnp.minimum(costs[1], costs[2]))
-        first = jnp.where(costs[1] <= least, numbers[1], jnp.where(costs[0] <= least, numbers[0], numbers[2]))
-        number = jnp.where(missing, _nearest(steps), counted + first)
+        lower, same, higher = (
+            jnp.sum(present * _outside(fixed - counted - about - shift) ** 2) for shift in (-1.0, 0.0, 1.0)
+        )
+        shift = jnp.where(same <= jnp.minimum(lower, higher), 0.0, jnp.where(lower <= higher, -1.0, 1.0))
+        number = jnp.where(missing, _nearest(steps), counted + about + shift)
         within = jnp.where(missing, self.mean, self.within)
         return self._shown(reading, steps, number, _outside(steps - number), within)
 

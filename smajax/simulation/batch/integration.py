@@ -24,6 +24,7 @@ from smajax.simulation.integration_error import (
     Outputs,
     Tolerance,
     coarse_to_fine,
+    described,
     integrated,
     reference,
     whole_transformation,
@@ -83,13 +84,19 @@ def integrated_recipe(recipe: Recipe, axes: Axes, tolerance: Tolerance) -> tuple
     most = max(1, MOST_BYTES // (8 * stored * max(len(plain.keep), 1)))
     some = _some(axes, min(RUNS, most)) if tolerance is not None else {}
 
+    ran: dict[
+        str, Outputs
+    ] = {}  # by the description of the integration: the reference tells the size of slopes as well
+
     def run(integration: Integration) -> tuple[None, Outputs]:
         if tolerance is None:
             return None, {}
-        own = dataclasses.replace(plain, integration=integration)
-        found = program(single_run, own, tuple(axes.names))(own, some, threads=1)
-        # Runs with impossible values decide nothing.
-        return None, _outputs(marked(recipe.system, some, found), names)
+        if (how := described(integration)) not in ran:
+            own = dataclasses.replace(plain, integration=integration)
+            found = program(single_run, own, tuple(axes.names))(own, some, threads=1)
+            # Runs with impossible values decide nothing.
+            ran[how] = _outputs(marked(recipe.system, some, found), names)
+        return None, ran[how]
 
     choices = coarse_to_fine(recipe.system, bool(recipe.slopes) and not slopes)
     if slopes:

@@ -78,11 +78,8 @@ def single_run(recipe: Recipe, values: Values) -> dict[str, jax.Array]:
     if not recipe.slopes:
         return without_slopes(recipe, values)
     at = {name: values[name] if name in values else get_parameters(recipe.system, [name])[0] for name in recipe.slopes}
-    return (
-        _slopes_along(recipe, values, at)
-        if recipe.integration.tolerance is not None
-        else _slopes_back(recipe, values, at)
-    )
+    slopes = _slopes_back if recipe.integration.tolerance is None else _slopes_along
+    return slopes(recipe, values, at)
 
 
 def _slopes_along(recipe: Recipe, values: Values, at: Values) -> dict[str, jax.Array]:
