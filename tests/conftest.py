@@ -35,6 +35,9 @@ if UNOPTIMISED.split("=")[0] not in os.environ.get("XLA_FLAGS", ""):
 UNOPTIMISED_LEVELS = {"codegen_level": 0, "speed_level": 0}
 OPTIMISED_LEVELS: dict[str, int] = {}
 
+# Each worker of the tests has a core of its own; a second process beside each would take the other's (`tests/core/test_worker_process.py` has one).
+os.environ.setdefault("SMAJAX_WORKER", "none")
+
 # Files that take longest, longest first (CPU time of a run without cached programs). A worker takes a whole file, in which the
 # tests of a rig share traced and compiled programs; a long one begun last would keep one worker busy alone.
 LONGEST = (

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 from smajax.attribution.assumed_parameters import assumed, expansion_not_given
 from smajax.attribution.averaged_prediction import Averaged, averaged, with_averages
+from smajax.attribution.begun_ahead import AVERAGED, UNKNOWN_TERMS
 from smajax.attribution.confounders import confounders
 from smajax.attribution.context import Context, Outcome
 from smajax.attribution.final_model_findings import effects_found, parameters_found, priors_found
@@ -26,10 +28,11 @@ WRITING = "standard errors and pictures"
 
 def unknown_terms_of(context: Context, outcome: Outcome, verdict: Verdict) -> tuple[Lacking, tuple[str, ...]]:
     """(unknown terms, effects that they supersede): sought where something is missing that is in all runs."""
-    setting, lacking = context.setting, outcome.lacking
+    setting, lacking, final = context.setting, outcome.lacking, outcome.final
     if lacking is None:
         missing = verdict in (Verdict.PARTLY_EXPLAINED, Verdict.NOT_IN_LIBRARY) and not outcome.one_outlier
-        lacking = unknown_terms(setting, outcome.final) if missing else Lacking()
+        here = partial(unknown_terms, setting, final)
+        lacking = outcome.result(UNKNOWN_TERMS, final, here) if missing else Lacking()
     left_out = lacking.terms[0].left_out_after if lacking.terms else None
     if left_out is not None and not setting.predicts(left_out):
         return Lacking(), ()
@@ -70,7 +73,8 @@ def findings_of(
     average = Averaged()
     if len(job.fit_runs) > 1 and not brief:  # else none can be left out, which the band is made of
         clocks = {run.name: len(run.time) for run in experiment.runs}
-        average = averaged(setting, search, final, every_run(job), base, clocks)
+        here = partial(averaged, setting, search, final, every_run(job), base, clocks)
+        average = outcome.result(AVERAGED, final, here)
         runs = with_averages(runs, average.runs)
     states = {run.name: run.states for run in runs}
     extended_model = base_model = saved_model(job, setting, search, final, after, average, states)

@@ -14,17 +14,17 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.assembled_findings import findings_of, known_so_far
+from smajax.attribution.begun_ahead import OUTLIERS, OUTLIERS_OF_BASE, begin_ahead
 from smajax.attribution.config import AttributionConfig
 from smajax.attribution.context import Context, Interim, Outcome
 from smajax.attribution.declared_priors import of_unknowns
 from smajax.attribution.findings import Findings, Rejected, Remaining
 from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.held_out import compare, validated
-from smajax.attribution.input_of_run import FAR_LESS, corrected, record_errors, standing
+from smajax.attribution.input_of_run import FAR_LESS, begin_record_errors, corrected, record_errors, standing
 from smajax.attribution.job import job_of
 from smajax.attribution.joint_stage import (
     base_alone,
-    likeliest_so_far,
     search_again,
     search_beside_a_record,
     search_by_evidence,
@@ -33,17 +33,20 @@ from smajax.attribution.joint_stage import (
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.neutral_at_base import check_neutral
+from smajax.attribution.optimum import likeliest_so_far
 from smajax.attribution.outlier_run import outlier_runs
 from smajax.attribution.reasons import NoiseWithoutRun, PredictsTooLittle
-from smajax.attribution.record_error import NO_RECORDS, CorrectedRecords, FoundRecordErrors, NotConfirmed
+from smajax.attribution.record_error import NO_RECORDS, CorrectedRecords, FoundRecordErrors, NotConfirmed, OutlierRun
 from smajax.attribution.record_fits import MOST_LEFT
 from smajax.attribution.same_as_parameters import said_by_parameters
 from smajax.attribution.step_size_check import finer_integration
+from smajax.attribution.traces import begin_traces
 from smajax.attribution.unknown.search import in_place_of
 from smajax.core.blas_threads import on_one_blas_thread
 from smajax.core.progress import Progress, Result, Stage, as_progress, quiet, report_warnings
 from smajax.core.provenance import made_with
 from smajax.core.result_cache import ResultCache
+from smajax.core.worker_process import OF_PROGRAMS, worker_process
 from smajax.data.experiment.record import Experiment
 from smajax.fit.identifiability import Checks, TakenAt, identifiability
 from smajax.fit.preset_priors import visible
@@ -58,6 +61,7 @@ CHECKING = "checking what these runs determine"
 
 
 @on_one_blas_thread
+@worker_process(OF_PROGRAMS)
 def close_loop(  # keywords, which a caller names one by one
     experiment: Experiment,
     *,
@@ -136,6 +140,7 @@ def prepared(  # the stage's inputs, each once
     )
     if integration is None:
         report_warnings(progress, experiment.warnings)
+    begin_traces(setting.joint(setting.candidates, {}))  # what comes after the base fit
     base = setting.base(start, seed)
     # It was chosen where the fit begins, at which the wire may not even move. Now, and not when the whole search has been made with it.
     if integration is None and (finer := finer_integration(setting, (), base.values)) is not None:
@@ -158,6 +163,7 @@ def prepared(  # the stage's inputs, each once
     context = Context(job, setting, start, base, seed, checks, interim, records)
     setting.after_round = None if interim is None else _now_and_then(context, interim)
     if records.asks and len(records.errors) < MOST_RECORD_ERRORS:
+        setting.begin_wrong_record = partial(begin_record_errors, setting, runs=job.fit_runs)
         setting.wrong_record = partial(
             record_errors, setting, runs=job.fit_runs, times_less=FAR_LESS, trials=records.may_try
         )
@@ -186,12 +192,14 @@ def with_records_corrected(context: Context, logged: Experiment | None = None) -
     `logged`: the experiment with all runs as they were logged; None: that of `context`.
     """
     begun, logged = context, logged or context.job.experiment
-    first = context, outcome = searched_finely(context)
+    context, outcome = searched_finely(context)
+    first = context, outcome = context, begin_ahead(context, outcome)
     while (wrong := wrong_record(context, outcome)) is not None:
         context.setting.progress(Result(wrong))
         records = replace(context.records, errors=(*context.records.errors, *wrong.errors))
         context = _again(context, reduce(corrected, wrong.errors, context.job.experiment), records)
         context, outcome = searched_finely(context, (outcome.search, wrong.beside))
+        outcome = begin_ahead(context, outcome)
     errors = context.records.errors
     stand = standing(errors, outcome.search, outcome.final, len(context.job.fit_runs))
     if context.records.on_trial and not leaves_little(context, outcome.final):
@@ -299,12 +307,17 @@ def against_an_outlier_run(context: Context, outcome: Outcome) -> Outcome:
     setting, base, final = context.setting, outcome.base, outcome.final
     if setting.is_noise(final):
         return outcome
+
     names = [run.name for run in context.job.fit_runs]
-    outcome = replace(outcome, outliers=outlier_runs(setting, base, names))
+
+    def outliers(what: str, model: Model) -> tuple[OutlierRun, ...]:
+        return outcome.result(what, model, partial(outlier_runs, setting, model, names))
+
+    outcome = replace(outcome, outliers=outliers(OUTLIERS_OF_BASE, base))
     if not final.effects:
         return outcome
     if not outcome.one_outlier:
-        return replace(outcome, outliers=outlier_runs(setting, final, names) or outcome.outliers)
+        return replace(outcome, outliers=outliers(OUTLIERS, final) or outcome.outliers)
     setting.set_aside(final, NoiseWithoutRun(outcome.outliers[0].run))
     return replace(outcome, final=base, lacking=None)
 

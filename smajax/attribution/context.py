@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -13,9 +14,11 @@ from smajax.attribution.job import Job
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.record_error import NO_RECORDS, CorrectedRecords, OutlierRun
 from smajax.attribution.unknown.search import Lacking
+from smajax.core.worker_process import Call
 from smajax.fit.identifiability import Checks
 from smajax.fit.levenberg_marquardt import Fit
 
+Result = TypeVar("Result")
 Interim = Callable[[Findings], object]  # gets what is known of an attribution that goes on
 
 
@@ -43,8 +46,14 @@ class Outcome:
     lacking: Lacking | None = None  # unknown terms, where they have been asked for
     superseded: tuple[str, ...] = ()
     outliers: tuple[OutlierRun, ...] = ()
+    calls: Mapping[str, tuple[Model, Call[Any]]] = field(default_factory=dict)  # by `begin_ahead`, with the model
 
     @property
     def one_outlier(self) -> bool:
         """Whether without one run all the others are explained."""
         return any(run.residual_is_noise for run in self.outliers)
+
+    def result(self, what: str, model: Model, here: Callable[[], Result]) -> Result:
+        """What was begun of `model` under this name; what `here` gives where nothing was, or of another model."""
+        begun_of, call = self.calls.get(what, (None, None))
+        return call.result() if call is not None and begun_of is model else here()

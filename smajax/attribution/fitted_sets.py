@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -11,8 +12,18 @@ from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.laplace_evidence import FittedModel, independent_error
 from smajax.attribution.record_error import FoundRecordErrors
 from smajax.attribution.unknown.search import AskedFor
+from smajax.core.progress import quiet
 from smajax.fit.levenberg_marquardt import FitSettings
 from smajax.model.effects.candidate import Extent
+
+
+def nothing(_: Any) -> None:
+    """Of a search that nobody follows."""
+
+
+def no(_: Any) -> bool:
+    """Of a search that nobody ends."""
+    return False
 
 
 @dataclass
@@ -37,20 +48,38 @@ class JointSearch:
     rounds_before: int = 0  # of an earlier search, from whose models this one begins
     asked_for_one: bool = False  # whether one effect was sought in the place of the many of a model
     thorough: bool = True  # ends only where no effect of the likeliest model can be removed or replaced
-    on_round: Callable[[JointRound], None] = lambda _: None
+    on_round: Callable[[JointRound], None] = nothing
+    # Gets the model of each round: what the end will ask may be begun.
+    begin_ahead: Callable[[FittedModel], None] = nothing
     # What the search goes on from in the place of a model of many effects, itself where nothing is to be sought beside it; None: as it is.
-    in_place_of_many: Callable[[FittedModel], FittedModel | None] = lambda _: None
+    in_place_of_many: Callable[[FittedModel], FittedModel | None] = nothing
     # What it goes on from where it would end with a model; None: it ends.
-    before_the_end: Callable[[FittedModel], FittedModel | None] = lambda _: None
+    before_the_end: Callable[[FittedModel], FittedModel | None] = nothing
     # Whether the record of one run is wrong where a model of many effects leaves many noises: the search ends, and is made again with it corrected.
-    has_wrong_record: Callable[[FittedModel], bool] = lambda _: False
+    has_wrong_record: Callable[[FittedModel], bool] = no
     # Whether it ends with a model because values of presets, which it holds, can make up for most of what that leaves.
-    needs_presets: Callable[[FittedModel], bool] = lambda _: False
+    needs_presets: Callable[[FittedModel], bool] = no
     wrong_record: FoundRecordErrors | None = None
     free_beside: tuple[str, ...] | None = (
         None  # effects beside which free values of presets take most of what is left, if that ended the search
     )
     lacking: AskedFor | None = None  # unknown terms beside the base model, where they were asked for
+
+    def alone(self) -> JointSearch:
+        """What was fitted, for a second process, which does not search."""
+        settings = replace(self.settings, progress=quiet)
+        return JointSearch(
+            self.joint,
+            self.extent,
+            settings,
+            self.noise,
+            self.noise_given,
+            dict(self.fitted),
+            detectable=self.detectable,
+            programs=self.programs,
+            traced=self.traced,
+            winner=self.winner,
+        )
 
     def error(self, model: FittedModel) -> float:
         """`independent_error` of what `model` leaves."""
@@ -69,6 +98,14 @@ class JointSearch:
         values = np.asarray([model.log_evidence(error**2) for model in self.fitted.values()])
         weights = np.exp(values - values.max())
         return dict(zip(self.fitted, (weights / weights.sum()).tolist(), strict=True))
+
+    def effect_probabilities(self, error: float) -> dict[str, float]:
+        """Of each effect that one of them has."""
+        found: dict[str, float] = {}
+        for effects, probability in self.probabilities(error).items():
+            for effect in effects:
+                found[effect] = found.get(effect, 0.0) + probability
+        return found
 
 
 @dataclass(frozen=True)

@@ -35,11 +35,13 @@ from smajax.attribution.record_fits import (
     likeliest,
     log_odds,
     needed,
+    with_record_errors,
 )
 from smajax.core.names_of_runs import of_run
 from smajax.core.parameters import parameters
 from smajax.data.experiment.record import Experiment, Prior, Run, Unknown
 from smajax.fit.base_model import base_model
+from smajax.fit.outputs_of_runs import begin_derivatives
 from smajax.model.extended import with_effects
 from smajax.model.system import System, recorded_apart
 
@@ -94,6 +96,14 @@ def record_errors(
     compared = replace(compared, fits=(*fits, *both))
     both = [fit for fit in both if needed(fit, compared.error, len(runs))]
     return found(compared.explaining(both)) or found(compared.on_trial(both))
+
+
+def begin_record_errors(setting: Search, hosts: Sequence[Host], runs: Sequence[Run]) -> None:
+    """Have a second process, where there is one, make the programs of `record_errors` with these arguments."""
+    names = [run.name for run in runs]
+    if len(runs) >= LEAST_RUNS:
+        beside = zip(hosts, _carried(setting, hosts), strict=True)
+        begin_derivatives([with_record_errors(setting, host, names, more)[0] for host, more in beside])
 
 
 def _carried(setting: Search, hosts: Sequence[Host]) -> list[list[str]]:

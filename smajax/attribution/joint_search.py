@@ -26,7 +26,7 @@ from smajax.attribution.round_cache import Asked, key_of_round, loaded_round, sa
 from smajax.attribution.set_starts import at_usual_size, starts
 from smajax.attribution.side_by_side import LOOSELY, fit_continued, fit_side_by_side, grouped_sets
 from smajax.attribution.subset_evidence import LinearModel, Subset, linear_model
-from smajax.attribution.traces import Traces, Variant, traces_at
+from smajax.attribution.traces import Traces, Variant, begin_traces, traces_at
 from smajax.fit.outputs_of_runs import made_ready
 from smajax.fit.starts import nearest
 
@@ -349,9 +349,13 @@ def _asked(
         search.detectable, search.programs, search.traced = known.detectable, known.programs, known.traced
         return known
     linear, traces = _linear(search, present, error)
+    search.begin_ahead(present)
     sets = chosen(search, linear, present, error)
-    begun = _begun(search, sets, linear, traces, error)
     effects = tuple(_effects(search, one) for one in sets)
+    if sets and not present.effects:
+        # What is likeliest beside the base model is most often what the next round begins with.
+        begin_traces(joint, effects[0], search.detectable, search.traced)
+    begun = _begun(search, sets, linear, traces, error)
     asked = Asked(effects, tuple(begun), search.detectable, search.programs, search.traced, lambda: traces)
     save_round(cache, key, asked)
     return asked

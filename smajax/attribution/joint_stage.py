@@ -33,12 +33,14 @@ from smajax.attribution.reasons import LikelierModel, NoLikelierModel, Reason, S
 from smajax.attribution.same_as_parameters import said_by_parameters
 from smajax.attribution.side_by_side import fitted_from, program_compiled
 from smajax.attribution.step_size_check import gain_kept_at_half_step
-from smajax.attribution.unknown.search import AskedFor, asked_for
+from smajax.attribution.unknown.search import AskedFor, Asking, asked_for, begin_asking
 from smajax.attribution.unknown.terms import UNKNOWN
 from smajax.fit.levenberg_marquardt import Fit, FitSettings
+from smajax.fit.outputs_of_runs import begin_derivatives
 from smajax.model.effects.library import LIBRARY
 from smajax.model.effects.prior_width import CoefficientPrior
 
+SOON = 3  # rounds, after which a search may end soon
 LIKELIEST = 4  # sets of effects from which the search goes on with the values of presets free
 
 
@@ -48,6 +50,7 @@ class _Stage:
     settings: FitSettings
     excluded: set[str] = field(default_factory=set)
     asked: list[AskedFor] = field(default_factory=list)  # unknown terms beside the base model, once they were asked for
+    asking: Asking | None = None  # what a second process may be fitting for that
     # Kinds of search (`thorough`) in which it was asked for a wrong record of a run, or is not to be.
     asked_for_records: set[bool] = field(default_factory=set)
 
@@ -70,6 +73,7 @@ class _Stage:
         search.on_round = partial(self.note, search)
         if search.thorough:  # else values of presets are held, which no function is beside
             search.in_place_of_many = partial(self.in_place_of_many, search)
+            search.begin_ahead = partial(self.begin_ahead, search)
             search.before_the_end = partial(self.before_the_end, search)
         search.has_wrong_record = partial(self.has_wrong_record, search)
         return search
@@ -90,7 +94,8 @@ class _Stage:
         # And without what looks much the same, which has been tried in their place.
         alike = {name for name in search.joint.coefficients for one in doubted if replaceable(name, one)}
         # No record is asked for without them: it would be held against less likely models than were found.
-        rest = _Stage(self.setting, self.settings, self.excluded | alike | set(doubted), self.asked, {True, False})
+        given = self.excluded | alike | set(doubted), self.asked, self.asking
+        rest = _Stage(self.setting, self.settings, *given, {True, False})
         other, instead = rest._from_base(base, search.programs)
         search.fitted = {**other.fitted, **search.fitted}
         error = search.error(search.best(search.error(found)))
@@ -183,11 +188,22 @@ class _Stage:
         """What is left of the others without one run, and without two."""
         return left_without(self.setting, model, program_compiled(search, model.effects))
 
+    def begin_ahead(self, search: JointSearch, present: FittedModel) -> None:
+        """What is done at the end of a search is begun by a second process, once it may soon end: unknown functions that are asked for, the program of the model itself."""
+        if search.rounds_before + len(search.rounds) < SOON:
+            return
+        if self.asking is None and not self.asked and self._asks(present):
+            self.asking = begin_asking(self.setting, search.fitted[()], present.effects)
+        begin_derivatives([search.joint.restricted(present.effects)[0]])  # takes it to its optimum
+
+    def _asks(self, found: FittedModel) -> bool:
+        """Whether unknown functions are asked for before a search ends with `found`."""
+        few = len(found.effects) < self.setting.config.many_effects
+        return bool(found.effects) and not (few and leaves_noise(self.setting, found))
+
     def before_the_end(self, search: JointSearch, found: FittedModel) -> FittedModel | None:
         """One effect that is likelier than those of `found`, in an equation where an unknown function is likelier than these too."""
-        if not found.effects or (
-            len(found.effects) < self.setting.config.many_effects and leaves_noise(self.setting, found)
-        ):
+        if not self._asks(found):
             return None
         fits = self._asked(search, found).fits
         functions = self._likelier(search, found, () if fits is None else fits.fitted)
@@ -206,7 +222,9 @@ class _Stage:
     def _asked(self, search: JointSearch, found: FittedModel) -> AskedFor:
         """Unknown functions beside the base model, whose values of presets are free in them as well. `found`: the likeliest model, beside which they may be asked for when the search has ended."""
         if not self.asked:
-            self.asked.append(asked_for(self.setting, search.fitted[()], found.effects))
+            # The effects that were likely when it was begun: with or without a second process the same programs.
+            likely = found.effects if self.asking is None else self.asking.likely
+            self.asked.append(asked_for(self.setting, search.fitted[()], likely, self.asking))
         search.lacking = self.asked[0]
         return self.asked[0]
 
@@ -294,13 +312,6 @@ class _Stage:
         self.setting.note(Round(len(self.setting.rounds) + 1, (), chosen, reason))
 
 
-def likeliest_so_far(search: JointSearch, best: FittedModel) -> tuple[JointSearch, Model, Model]:
-    """(the search, base model, likeliest model) as a search that goes on has fitted them, as `search_by_evidence` gives them."""
-    error = search.error(best)
-    first = as_model(search, search.fitted[()], error)
-    return search, first, as_model(search, best, error) if best.effects else first
-
-
 def base_alone(setting: Search, base: Fit) -> tuple[JointSearch, Model, Model]:
     """(a search of nothing, base model, the same) before anything is searched, as `search_by_evidence` gives it."""
     search = _Stage(setting, _settings(setting)).joint_search({})
@@ -364,6 +375,8 @@ def _kept_at_half_step(
         if search.wrong_record is not None:  # nothing is said of these models: they are fitted again
             error = search.error(found)
             return search, as_model(search, search.fitted[()], error), as_model(search, found, error)
+        if setting.begin_wrong_record is not None:
+            setting.begin_wrong_record([search.fitted[()], found])
         found = with_no_effect_too_many(search, found)
         error = search.error(found)
         base_model = refined(search, search.fitted[()], search.error_of(()))
@@ -374,22 +387,13 @@ def _kept_at_half_step(
         if kept >= setting.config.gain_kept_at_half_step:
             break
         stage.exclude([name for name in final.effects if LIBRARY[name].candidate.stick_slip], kept)
-    probabilities = effect_probabilities(search, error)
+    probabilities = search.effect_probabilities(error)
     for effect in search.joint.coefficients:
         seen = setting.evidence.setdefault(effect, Evidence())
         seen.probability = probabilities.get(effect, float("nan"))  # in no set that was worth a fit
         if (effect,) in search.fitted:
             seen.alone_rmse = search.fitted[(effect,)].rms
     return search, first, final
-
-
-def effect_probabilities(search: JointSearch, error: float) -> dict[str, float]:
-    """Posterior probability of each effect among the models that were fitted; `error` of an independent sample, SI."""
-    found: dict[str, float] = {}
-    for effects, probability in search.probabilities(error).items():
-        for effect in effects:
-            found[effect] = found.get(effect, 0.0) + probability
-    return found
 
 
 def _joined(effects: Sequence[str]) -> str:

@@ -96,6 +96,20 @@ class Search:
     after_round: Callable[[Any, Any], object] | None = None
     # An input of one run that was recorded wrongly, beside some models, in the place of one that the search has come to; None: it is not asked for.
     wrong_record: Callable[[Sequence[Any], Any], FoundRecordErrors | None] | None = None
+    # Has what that asks beside some models made ready by a second process.
+    begin_wrong_record: Callable[[Sequence[Any]], None] | None = None
+
+    def alone(self) -> Search:
+        """The same settings for a second process, which reports nothing and records no rounds."""
+        return dataclasses.replace(
+            self,
+            progress=quiet,
+            evidence={},
+            rounds=[],
+            after_round=None,
+            wrong_record=None,
+            begin_wrong_record=None,
+        )
 
     def note(self, done: Round) -> None:
         """Record a round and report it."""

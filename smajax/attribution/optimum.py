@@ -173,3 +173,10 @@ def _needed(search: JointSearch, effect: str, model: FittedModel, error: float) 
     off = np.asarray([joint.deviation(model.names[k], float(model.values[joint.slots[model.names[k]]])) for k in own])
     covariance = model.covariance(error**2)[np.ix_(own, own)]
     return float(0.5 * off @ np.linalg.lstsq(covariance, off, rcond=None)[0])
+
+
+def likeliest_so_far(search: JointSearch, best: FittedModel) -> tuple[JointSearch, Model, Model]:
+    """(the search, base model, likeliest model) as a search that goes on has fitted them, as `search_by_evidence` gives them."""
+    error = search.error(best)
+    first = as_model(search, search.fitted[()], error)
+    return search, first, as_model(search, best, error) if best.effects else first

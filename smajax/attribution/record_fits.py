@@ -148,18 +148,11 @@ class Beside:
     @classmethod
     def of(cls, setting: Search, host: Host, runs: Sequence[str], carried: Sequence[str] = ()) -> Beside | None:
         """None where no record can be wrong in any of the ways known. `carried`: effects that its program has as well, off."""
-        own, slots = setting.restricted((*host.effects, *carried))
-        values = jnp.asarray(host.values[slots])
-        system, known = own.system_at(values), own.per_run.names
-        kinds = [kind for kind in KINDS if kind.coefficient in own.per_run.single or _possible(kind, system)]
-        fresh = [kind.coefficient for kind in kinds if kind.coefficient not in known]
-        whole = with_effects(system, [name.split(".")[0] for name in fresh])
-        start = jnp.concatenate([own.per_run_at(values), jnp.zeros((len(runs), len(fresh)))], axis=1)
-        per_run = PerRun((*known, *fresh), tuple(runs), start, own.per_run.single)
-        problem = own.with_system(whole, per_run=per_run)
+        problem, kinds = with_record_errors(setting, host, runs, carried)
         every = {of_run(kind.coefficient, run): (kind, run) for run in runs for kind in kinds}
         # What was corrected before is a parameter of the base model.
         possible = {name: one for name, one in every.items() if name not in setting.unknowns}
+        own, slots = setting.restricted((*host.effects, *carried))
         (left,) = misfits(own, [host.values[slots]])
         return cls(setting, host, _with_events(setting, host, problem, possible), possible, left) if possible else None
 
@@ -254,6 +247,20 @@ class Beside:
             model = fitted_model(joint, (*host.effects, *names), fit.values, ())
             found.append(Fit(host, tuple(events), model, self._before))
         return found
+
+
+def with_record_errors(
+    setting: Search, host: Host, runs: Sequence[str], carried: Sequence[str] = ()
+) -> tuple[Problem, list[Kind]]:
+    """(the runs by a host with every error of a record, at none; the kinds of these). `carried`: as of `Beside.of`."""
+    own, slots = setting.restricted((*host.effects, *carried))
+    values = jnp.asarray(host.values[slots])
+    system, known = own.system_at(values), own.per_run.names
+    kinds = [kind for kind in KINDS if kind.coefficient in own.per_run.single or _possible(kind, system)]
+    fresh = [kind.coefficient for kind in kinds if kind.coefficient not in known]
+    whole = with_effects(system, [name.split(".")[0] for name in fresh])
+    start = jnp.concatenate([own.per_run_at(values), jnp.zeros((len(runs), len(fresh)))], axis=1)
+    return own.with_system(whole, per_run=PerRun((*known, *fresh), tuple(runs), start, own.per_run.single)), kinds
 
 
 def _possible(kind: Kind, system: System) -> bool:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from smajax.attribution.fit_programs import Effects, compiled_for, samples_of
 from smajax.attribution.joint_parameters import NUDGE, JointParameters, residual_and_columns
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.fit.integration import with_integration
-from smajax.fit.outputs_of_runs import made_ready, slopes_at
+from smajax.fit.outputs_of_runs import begin_derivatives, made_ready, slopes_at
 from smajax.fit.problem import Problem
 from smajax.model.drive.inputs import InputLagTerm
 from smajax.model.effects.candidate import Extent
@@ -25,6 +26,8 @@ from smajax.model.effects.library import LIBRARY
 from smajax.simulation.steppers import ONE_STEP
 
 MANY = 5_000  # samples of all runs, from which on a linear model takes longer than compiling a program for it
+# Effects of a program: 47 in two take 4.0 s to compile and in one 4.4, and half the time to run; in three 4.5.
+MOST = 24
 MOST_OFF = 1.0  # of what a model leaves, root mean square: what one step a sample may be off by where derivatives are taken by it
 
 
@@ -62,13 +65,7 @@ def traces_at(
     sample, which only say which sets of effects are worth a fit, unless that is far off.
     """
     values, present = model.values, model.effects
-    among = joint.coefficients if candidates is None else joint.ordered((*present, *candidates))
-    absent = [effect for effect in among if effect not in present]
-    samples = samples_of(joint.problem)
-    programs = by_program(absent, looked_for, samples)
-    # What a program of an earlier search carried may be in the base model since: an input that was recorded wrongly.
-    known = [joint.ordered(one) for one in compiled]
-    carried = [compiled_for(joint.ordered((*present, *together)), known, samples) for together in programs]
+    among, programs, carried = _carried(joint, present, candidates, looked_for, compiled)
     restricted = [joint.restricted(one) for one in carried]
     shared = joint.free([effect for effect in among if effect in present])
     for problems in from_coarse_to_fine([problem for problem, _ in restricted]):
@@ -80,6 +77,34 @@ def traces_at(
     }
     every = tuple(dict.fromkeys([*compiled, *carried]))
     return Traces(np.asarray(values), present, model.residual, columns, {**by_themselves, **variants}, places, every)
+
+
+def begin_traces(
+    joint: JointParameters,
+    present: Sequence[str] = (),
+    candidates: Sequence[str] | None = None,
+    compiled: Sequence[Effects] = (),
+) -> None:
+    """Have a second process, where there is one, make the programs of `traces_at` a model that has the effects `present`, by one step a sample."""
+    carried = _carried(joint, present, candidates, None, compiled)[2]
+    begin_derivatives([with_integration(joint.restricted(one)[0], ONE_STEP) for one in carried])
+
+
+def _carried(
+    joint: JointParameters,
+    present: Sequence[str],
+    candidates: Sequence[str] | None,
+    looked_for: Sequence[str] | None,
+    compiled: Sequence[Effects],
+) -> tuple[tuple[str, ...], list[list[str]], list[Effects]]:
+    """(effects that are looked at, those that are traced by each program, those that it carries). Arguments as of `traces_at`."""
+    among = joint.ordered(tuple(joint.coefficients) if candidates is None else (*present, *candidates))
+    absent = [effect for effect in among if effect not in present]
+    samples = samples_of(joint.problem)
+    programs = by_program(absent, looked_for, samples)
+    # What a program of an earlier search carried may be in the base model since: an input that was recorded wrongly.
+    known = [joint.ordered(one) for one in compiled]
+    return among, programs, [compiled_for(joint.ordered((*present, *one)), known, samples) for one in programs]
 
 
 def from_coarse_to_fine(problems: Sequence[Problem]) -> Iterator[list[Problem]]:
@@ -137,13 +162,21 @@ def by_program(effects: Sequence[str], looked_for: Sequence[str] | None = None, 
     Effects of a group that exclude each other are apart from the others: each of these would be computed with all of those in every step. On a
     bias-spring bench 48 effects take 0.8 s in two programs and 1.9 s in one, and half the time to compile. So are, where the runs have many `samples`, those
     that shift an input: beside them every step has three parts, and the others take a third of the time without. Those that the search does not look for have a program of their own too, so that the others share the search's; `looked_for`: None for all.
+    No program has more than `MOST` effects: a step computes all of them for the derivative of one.
     """
     among = effects if looked_for is None else [effect for effect in effects if effect in looked_for]
     apart = list(of_groups(among))
     late = [effect for effect in among if samples > MANY and issubclass(LIBRARY[effect], InputLagTerm)]
     others = [effect for effect in among if effect not in apart and effect not in late]
     rest = [effect for effect in effects if effect not in among]
-    return [one for one in (others, apart, late, rest) if one] or [[]]
+    return [part for one in (others, apart, late, rest) for part in _parts(one)] or [[]]
+
+
+def _parts(effects: Sequence[str]) -> list[list[str]]:
+    """At most `MOST` effects each, as many in one as in another."""
+    count = -(-len(effects) // MOST)
+    edges = [len(effects) * part // count for part in range(count + 1)] if count else []
+    return [list(effects[first:last]) for first, last in pairwise(edges)]
 
 
 def _places(joint: JointParameters, effects: Sequence[str], extent: Extent) -> dict[Variant, Mapping[str, float]]:

@@ -170,8 +170,18 @@ def user_cache() -> Path:
     return Path(own) if own else Path.home() / ".cache"
 
 
+_taken: list[int] = []
+
+
+def take_cores(count: int) -> None:
+    """Have `available_cores` say so many from now on."""
+    _taken[:] = [count]
+
+
 def available_cores() -> int:
     """Cores that this process may use; all of the machine where the system does not say."""
+    if _taken:
+        return _taken[0]
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 

@@ -23,10 +23,13 @@ from smajax.engine.facade import Engine as Engine
 from smajax.engine.facade import EngineError as EngineError
 from smajax.engine.facade import EngineWarning as EngineWarning
 from smajax.engine.facade import Program as Program
+from smajax.engine.facade import Wanted as Wanted
+from smajax.engine.facade import begin_programs as begin_programs
 from smajax.engine.facade import by_machine_code as by_machine_code
 from smajax.engine.facade import cached as cached
 from smajax.engine.facade import engine_of as engine_of
 from smajax.engine.facade import program as program
+from smajax.engine.facade import programs as programs
 from smajax.engine.text import Unsupported as Unsupported
 from smajax.engine.xla import ON_CARD as ON_CARD
 from smajax.engine.xla import block_size as block_size

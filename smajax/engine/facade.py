@@ -6,21 +6,21 @@ says what was in the way. The caller knows nothing of it. The environment variab
 
 from __future__ import annotations
 
-import gc
 import importlib.util
 import os
 import warnings
-from collections.abc import Callable, Hashable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from threading import Event
-from typing import TYPE_CHECKING, Any, Literal, TypeVar, cast, get_args
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar, cast, get_args
 
 import jax
 import numpy as np
 
+from smajax.core import worker_process
 from smajax.core.beside import begun
+from smajax.core.compiling import compiling
 from smajax.core.operating_system import WINDOWS, available_cores
 from smajax.engine import xla
 from smajax.engine.arguments import (
@@ -35,10 +35,10 @@ from smajax.engine.arguments import (
 from smajax.engine.cache import versions
 from smajax.engine.kernel import Stopped
 from smajax.engine.text import Unsupported
-from smajax.engine.traced import Function, Traced
+from smajax.engine.traced import Function, Traced, collector_paused
 
 if TYPE_CHECKING:
-    from smajax.engine.native import NativeProgram
+    from smajax.engine.native import MachineCode, NativeProgram
 
 Engine = Literal["auto", "native", "xla"]
 VARIABLE = "SMAJAX_ENGINE"
@@ -222,37 +222,60 @@ def program(
     meant = engine_of(engine)
     if meant == "auto" and devices and devices[0].platform != "cpu":
         meant = "xla"
-    key = (key_of(function, model, names), alone, meant, quickly, along)
-    return cached(_programs, key, lambda: _made(function, model, names, alone, meant, beside, quickly, along))
+    wanted = Wanted(function, model, names, alone, quickly, along)
+    key = wanted.key(meant)
+    return cached(_programs, key, lambda: _made(wanted, key, meant, beside))
 
 
-@contextmanager
-def _collector_paused() -> Iterator[None]:
-    """Without Python's collector of garbage, which looks at the millions of objects of a program again and again: an eighth of the time."""
-    was = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was:
-            gc.enable()
+class Wanted(NamedTuple):
+    """What a program is made of: arguments of `program`."""
+
+    function: Function
+    model: Any
+    names: tuple[str, ...]
+    alone: bool = False
+    quickly: bool = False
+    along: Along = ONE_DIRECTION
+
+    def key(self, engine: Engine) -> Hashable:
+        """Of the program, in a process."""
+        return key_of(self.function, self.model, self.names), self.alone, engine, self.quickly, self.along
 
 
-@_collector_paused()
-def _made(
-    function: Function,
-    model: Any,
-    names: tuple[str, ...],
-    alone: bool,
-    engine: Engine,
-    beside: bool,
-    quickly: bool,
-    along: Along,
-) -> Program:
+def begin_programs(wanted: Sequence[Wanted], first: bool = False) -> None:
+    """Have the second process make them, where there is one (`worker_process`); `program` then gives them. `first`: before those that it was to make before."""
+    engine = engine_of()
+    if engine == "xla" or not by_machine_code():
+        return
+    from smajax.engine.native import machine_code
+
+    for one in wanted:
+        if (key := one.key(engine)) not in _programs:
+            worker_process.begin(key, machine_code, tuple(one), first)
+
+
+def programs(wanted: Sequence[Wanted]) -> None:
+    """Make several, for `program` to give: some by the second process, where there is one, and here each compiled beside the tracing of the next."""
+    begin_programs(wanted[1:], first=True)
+    engine, left, made = engine_of(), list(wanted), []
+    while left:
+        here = next((one for one in left if not worker_process.is_called(one.key(engine))), left[0])
+        left.remove(here)
+        made.append(program(**here._asdict(), beside=True))
+    for one in made:
+        one.wait()
+
+
+@collector_paused()
+def _made(wanted: Wanted, key: Hashable, engine: Engine, beside: bool) -> Program:
+    function, model, names, alone, quickly, along = wanted
     made = partial(Program, function, model, names, alone, along=along)
     if engine == "xla":
         return made(None)
-    traced = Traced(function, model, names)  # what goes wrong in here goes wrong by XLA too
+    # What goes wrong in here goes wrong by XLA too.
+    with compiling():
+        there = worker_process.taken(key)
+        known: MachineCode | Traced = Traced(function, model, names) if there is None else there[0]
     if engine == "auto" and WINDOWS:
         _say(UNTRIED)
         return made(None)
@@ -260,7 +283,7 @@ def _made(
         # Imported here: the translator reads names of JAX that a release may move, and then XLA has to run all the same.
         from smajax.engine.native import NativeProgram
 
-        native = NativeProgram(traced, alone, beside, quickly, along)
+        native = NativeProgram(known, names, alone, along, beside, quickly)
     except Exception as error:
         if engine == "native":
             raise

@@ -9,14 +9,11 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from smajax.engine.text import NAME, Array
-
-if TYPE_CHECKING:
-    from smajax.engine.translate import Translated
 
 ALIGNED = 64  # bytes
 # Of LLVM; part of the key of a cached program. Every instruction is on a whole vector already, and a step is long enough as
@@ -102,19 +99,19 @@ def processor() -> str:
     return f"{llvm.get_default_triple()} {llvm.get_host_cpu_name()} {able}"
 
 
-def compiled(translated: Translated, quickly: bool = False) -> bytes:
-    """The machine code of a translated program, an object file."""
+def compiled(text: str, quickly: bool = False) -> bytes:
+    """The machine code of a program by its text, an object file."""
     import llvmlite.binding as llvm
 
     machine = _machine(quickly)
-    module = llvm.parse_assembly(translated.text)
+    module = llvm.parse_assembly(text)
     module.triple, module.data_layout = machine.triple, str(machine.target_data)
     module.verify()
     options = llvm.create_pipeline_tuning_options(speed_level=COMPILE_OPTIONS["speed_level"])
     for name in ("loop_vectorization", "slp_vectorization", "loop_unrolling"):
         setattr(options, name, COMPILE_OPTIONS[name])
     builder = llvm.create_pass_builder(machine, options)
-    _passes(builder, few=quickly or len(translated.text) > LONG).run(module, builder)
+    _passes(builder, few=quickly or len(text) > LONG).run(module, builder)
     return bytes(machine.emit_object(module))
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, wait
 from threading import Event
-from typing import Any
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -14,51 +14,81 @@ import numpy as np
 from smajax.core.beside import begun
 from smajax.core.compiling import compiling
 from smajax.engine import cache
-from smajax.engine.arguments import ONE_DIRECTION, Along, is_array
+from smajax.engine.arguments import Along, is_array
 from smajax.engine.kernel import Kernel, compiled, divides_slowly, has_wide_vectors, vector_bits
-from smajax.engine.traced import Traced, plain
-from smajax.engine.translate import VECTORS, Translated, translate
+from smajax.engine.text import Array
+from smajax.engine.traced import Function, Traced, collector_paused, plain
+from smajax.engine.translate import VECTORS, translate
 
 BITS = 60  # of the number by which runs are put in order
 MOST_SORTED = 6  # numbers of a run that are looked at for that
+
+
+class Layout(NamedTuple):
+    """What the caller of a program's machine code has to know: of its arguments, its results and the memory that it works in."""
+
+    lanes: int  # runs of a vector
+    group: int  # vectors that go side by side
+    scratch: int  # bytes a thread needs
+    results: tuple[Array, ...]
+    several: tuple[bool, ...]  # which results are one for each direction
+    shared: tuple[str, ...]  # dtypes of the model's arrays
+    own: str  # dtype of the numbers that a run has of its own
+    tree: Any  # how the results are put together
+
+
+class MachineCode(NamedTuple):
+    """A compiled program as it goes from one process to another."""
+
+    code: bytes
+    layout: Layout
+
+
+@collector_paused()
+def machine_code(
+    function: Function, model: Any, names: tuple[str, ...], alone: bool, quickly: bool, along: Along
+) -> MachineCode:
+    """A function of one run, traced, translated and compiled; raises whatever stands in the way. Arguments as of `NativeProgram`."""
+    text, layout = _translated(Traced(function, model, names), alone, along)
+    return MachineCode(_code(text, quickly), layout)
+
+
+def _translated(traced: Traced, alone: bool, along: Along) -> tuple[str, Layout]:
+    """LLVM's text of a program, and its layout."""
+    program = traced.program
+    kinds = [str(aval.dtype) for aval in program.in_avals]
+    dtypes = {*kinds, *(str(aval.dtype) for aval in program.out_avals)}
+    own = [False] * traced.shared + [True] * len(traced.names)
+    each = [False] * traced.shared + [name in along.names for name in traced.names]
+    vectors = 1 if alone else VECTORS
+    found = translate(
+        program, own, lanes_of(dtypes), divides_slowly(), vectors, mask_of(dtypes), along=each, directions=along.number
+    )
+    shared = tuple(kinds[: traced.shared])
+    sizes = found.lanes, found.vectors, found.scratch
+    return found.text, Layout(*sizes, found.results, found.several, shared, str(traced.number), traced.tree)
 
 
 class NativeProgram:
     """`function(model, own)` of one run as a function of whole arrays, for models with arrays of the same shapes."""
 
     def __init__(
-        self,
-        traced: Traced,
-        alone: bool,
-        beside: bool = False,
-        quickly: bool = False,
-        along: Along = ONE_DIRECTION,
+        self, made: Traced | MachineCode, names: tuple[str, ...], alone: bool, along: Along, beside: bool, quickly: bool
     ) -> None:
-        """`alone`: for one run at a time. `beside`: compiled by another thread, for which the first call waits. `quickly`, `along`: as of `program`.
+        """`made`: the function as JAX traces it, or its machine code. `alone`: for one run at a time. `beside`: compiled by another thread, for which the first call waits. `quickly`, `along`: as of `program`.
 
         Raises Unsupported for what has no translation, and whatever LLVM raises: beside, at the first call.
         """
-        program = traced.program
-        kinds = [str(aval.dtype) for aval in program.in_avals]
-        dtypes = {*kinds, *(str(aval.dtype) for aval in program.out_avals)}
-        own = [False] * traced.shared + [True] * len(traced.names)
-        vectors = 1 if alone else VECTORS
-        each = [False] * traced.shared + [name in along.names for name in traced.names]
-        translated = translate(
-            program,
-            own,
-            lanes_of(dtypes),
-            divides_slowly(),
-            vectors,
-            mask_of(dtypes),
-            along=each,
-            directions=along.number,
-        )
-        self.scratch = translated.scratch  # memory that a thread works in, bytes
-        self._kernel = _begun(translated, quickly) if beside else _done(translated, quickly)
-        self._tree, self._names, self._dtype = traced.tree, traced.names, traced.number
-        self._along, self._several = along, translated.several
-        self._shared = [np.dtype(kind) for kind in kinds[: traced.shared]]
+        if isinstance(made, MachineCode):
+            layout = made.layout
+            self._kernel = _done(_kernel, made.code, layout)
+        else:
+            text, layout = _translated(made, alone, along)
+            make = _done if not beside else _begun
+            self._kernel = make(_compiled_kernel, text, layout, quickly)
+        self.scratch = layout.scratch
+        self._names, self._along, self._layout = names, along, layout
+        self._shared = [np.dtype(kind) for kind in layout.shared]
 
     def wait(self) -> None:
         """Until it is compiled, or that has failed."""
@@ -78,12 +108,12 @@ class NativeProgram:
         by_run = [own[name] for name in self._names if name not in self._along.names]
         order = alike(by_run) if by_run else np.arange(len(own[self._names[0]]))
         columns = [column for name in self._names for column in np.atleast_2d(own[name].T)]
-        values = [np.ascontiguousarray(column[order], dtype=self._dtype) for column in columns]
+        values = [np.ascontiguousarray(column[order], dtype=self._layout.own) for column in columns]
         back = np.argsort(order)
         found = self._kernel.result()(shared, values, threads, stop)
         if not self._along.names:
-            return jax.tree.unflatten(self._tree, [one[back] for one in found])
-        return jax.tree.unflatten(self._tree, self._by_direction(found, back))
+            return jax.tree.unflatten(self._layout.tree, [one[back] for one in found])
+        return jax.tree.unflatten(self._layout.tree, self._by_direction(found, back))
 
     def _by_direction(self, found: list[np.ndarray], back: np.ndarray) -> list[np.ndarray]:
         """Leaves of shape (runs, directions, ...) of what the program gives, which is emptied on the way.
@@ -91,7 +121,7 @@ class NativeProgram:
         What is the same in all directions is there once, to be read and not written.
         """
         count, leaves = self._along.number, []
-        for each in self._several:
+        for each in self._layout.several:
             one = found.pop(0)
             shape = (len(back), count, *one.shape[1:])
             if not each:
@@ -105,27 +135,35 @@ class NativeProgram:
         return leaves
 
 
-def _done(translated: Translated, quickly: bool) -> Future[Kernel]:
+def _done(make: Callable[..., Kernel], *arguments: Any) -> Future[Kernel]:
     """Compiled now."""
     made: Future[Kernel] = Future()
     with compiling():
-        made.set_result(_kernel(translated, quickly))
+        made.set_result(make(*arguments))
     return made
 
 
-def _begun(translated: Translated, quickly: bool) -> Future[Kernel]:
+def _begun(make: Callable[..., Kernel], *arguments: Any) -> Future[Kernel]:
     """Compiled by another thread: LLVM lets Python go on."""
-    return begun(_kernel, translated, quickly) or _done(translated, quickly)
+    return begun(make, *arguments) or _done(make, *arguments)
 
 
-def _kernel(translated: Translated, quickly: bool) -> Kernel:
+def _compiled_kernel(text: str, layout: Layout, quickly: bool) -> Kernel:
+    return _kernel(_code(text, quickly), layout)
+
+
+def _kernel(code: bytes, layout: Layout) -> Kernel:
+    return Kernel(code, layout.lanes, layout.results, layout.scratch, layout.group)
+
+
+def _code(text: str, quickly: bool) -> bytes:
     """Loaded from the disk, or compiled and stored there."""
-    key = cache.key_of(translated.text, quickly)
+    key = cache.key_of(text, quickly)
     code = cache.load(key)
     if code is None:
-        code = compiled(translated, quickly)
+        code = compiled(text, quickly)
         cache.save(key, code)
-    return Kernel(code, translated.lanes, translated.results, translated.scratch, translated.vectors)
+    return code
 
 
 def alike(series: Sequence[np.ndarray]) -> np.ndarray:

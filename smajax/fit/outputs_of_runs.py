@@ -17,7 +17,7 @@ import numpy as np
 
 from smajax.core.operating_system import available_cores
 from smajax.core.parameters import set_vector
-from smajax.engine import Along, Program, by_machine_code, program
+from smajax.engine import Along, Program, Wanted, begin_programs, by_machine_code, program, programs
 from smajax.fit.needed_directions import NeededDirections
 from smajax.fit.packed_runs import predict_run
 from smajax.fit.problem import Problem
@@ -115,12 +115,16 @@ def runs_of_derivatives(problem: Problem, points: int, directions: int) -> int:
     return points * -(-directions // directions_of(problem))
 
 
-def _program(problem: Problem, function: Function, run: _Run, names: Collection[str], beside: bool = False) -> Program:
+def _wanted(problem: Problem, function: Function, run: _Run, names: Collection[str]) -> Wanted:
     """`function` of a run of the problem, compiled quickly or not by what it is made for, the length of a run."""
     quickly = problem.batch.output.shape[-1] <= SHORT
     tangents = tuple(name for name in names if name.startswith("tangent"))
     along = Along(tangents, directions_of(problem)) if tangents else Along()
-    return program(function, run, tuple(names), beside=beside, quickly=quickly, along=along)
+    return Wanted(function, run, tuple(names), quickly=quickly, along=along)
+
+
+def _program(problem: Problem, function: Function, run: _Run, names: Collection[str]) -> Program:
+    return program(**_wanted(problem, function, run, names)._asdict())
 
 
 def _columns(kind: str, rows: np.ndarray) -> dict[str, np.ndarray]:
@@ -177,19 +181,27 @@ def total_costs(problem: Problem, points: Sequence[np.ndarray] | np.ndarray) -> 
     return sums_of_squares(problem, rows) + prior
 
 
-def made_ready(problems: Sequence[Problem]) -> None:
-    """Compile what `predicted_and_derivatives` of these problems runs: each beside the tracing of the next."""
-    if len(problems) < 2:
-        return  # its first call compiles it
-    begun = []
+def _derivatives_of(problems: Sequence[Problem]) -> list[Wanted]:
+    """What `predicted_and_derivatives` of these problems runs."""
+    wanted = []
     for problem in problems:
         nothing = np.zeros((1, len(problem.names)))
         for number, run in enumerate(_runs(problem)):
             at = _of_run(problem, nothing, number)
             names = {**_columns("value", at), **_columns("tangent", at)}
-            begun.append(_program(problem, _along, run, names, beside=True))
-    for one in begun:
-        one.wait()
+            wanted.append(_wanted(problem, _along, run, names))
+    return wanted
+
+
+def begin_derivatives(problems: Sequence[Problem]) -> None:
+    """Have a second process, where there is one, compile what `predicted_and_derivatives` of these problems runs."""
+    begin_programs(_derivatives_of(problems))
+
+
+def made_ready(problems: Sequence[Problem]) -> None:
+    """Compile what `predicted_and_derivatives` of these problems runs."""
+    if len(problems) > 1:  # of one, its first call compiles it
+        programs(_derivatives_of(problems))
 
 
 def predicted_and_derivatives(

@@ -116,7 +116,7 @@ def _stage_and_search(
     named = fitted[0] if fitted and confirmed else None
     found = AskedFor(cast(Any, SimpleNamespace(fitted=fitted)), lambda: Lacking((), named))
 
-    def asked_for(_: Any, base: Any, likely: Any) -> AskedFor:
+    def asked_for(_: Any, base: Any, likely: Any, __: Any) -> AskedFor:
         asked.append(base)
         return found
 

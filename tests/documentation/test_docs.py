@@ -9,11 +9,13 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from unittest.mock import patch
 
 import pytest
 
 import smajax
 from smajax import __version__
+from smajax.control.presets import CONTROLLERS
 from smajax.core.parameters import parameters
 from smajax.model.effects.library import LIBRARY, of_others
 from smajax.model.presets import LOADS
@@ -39,16 +41,17 @@ def run(page: Path, folder: Path, only: str = "", without: str = "\0") -> None:
     Of the blocks those that hold `only` and not `without`.
     """
     names: dict[str, object] = {"__name__": "__main__"}
-    for language, name, text, shown in blocks(page):
-        if name:
-            (folder / name).write_text(text, encoding="utf-8")
-        if language != "python" or only not in text or without in text:
-            continue
-        printed = io.StringIO()
-        with contextlib.redirect_stdout(printed):
-            exec(compile(text, f"{page.name}: {text.splitlines()[0]}", "exec"), names)
-        if shown:
-            assert printed.getvalue() == shown, page.name
+    with patch.dict(CONTROLLERS), patch.dict(LIBRARY):  # what a page registers is there on that page alone
+        for language, name, text, shown in blocks(page):
+            if name:
+                (folder / name).write_text(text, encoding="utf-8")
+            if language != "python" or only not in text or without in text:
+                continue
+            printed = io.StringIO()
+            with contextlib.redirect_stdout(printed):
+                exec(compile(text, f"{page.name}: {text.splitlines()[0]}", "exec"), names)
+            if shown:
+                assert printed.getvalue() == shown, page.name
 
 
 @pytest.mark.parametrize(

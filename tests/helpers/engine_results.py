@@ -27,7 +27,7 @@ def by_machine_code(
     """`function` of every member by the translator."""
     program = jax.make_jaxpr(function)(*(jnp.zeros((), one.dtype) for one in own))
     translated = translate(program, [True] * len(own), lanes, wide, vectors, mask)
-    kernel = Kernel(compiled(translated, quickly), translated.lanes, translated.results, translated.scratch)
+    kernel = Kernel(compiled(translated.text, quickly), translated.lanes, translated.results, translated.scratch)
     return kernel([], [np.ascontiguousarray(one) for one in own], threads=1)[0]
 
 

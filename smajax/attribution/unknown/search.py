@@ -13,6 +13,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,13 +29,16 @@ from smajax.attribution.unknown.ranges import Sought
 from smajax.attribution.unknown.spline import design
 from smajax.attribution.unknown.term_fits import (
     APPROXIMATE,
+    FITTING_TERMS,
     INDISTINGUISHABLE,
     TermFits,
     fits_with_terms,
     least_error,
 )
 from smajax.attribution.values_per_run import held_out_owners, held_out_residuals
+from smajax.core.progress import Stage
 from smajax.core.whiteness import correlation_time, split_runs
+from smajax.core.worker_process import Call, begin_call
 from smajax.fit.integration import unlimited, with_integration
 from smajax.fit.outputs_of_runs import misfits
 from smajax.fit.sensitivity import Sensitivity, sensitivity
@@ -131,10 +135,36 @@ def _explains(with_it: float, without: float, noise: float) -> bool:
     return explained_share(with_it, without, noise) >= EXPLAINED
 
 
-def asked_for(setting: Search, model: Model | FittedModel, likely: Sequence[str] = ()) -> AskedFor:
-    """Unknown terms beside `model`. `likely`: as of `fits_with_terms`."""
-    fits = fits_with_terms(setting, model, likely)
-    return AskedFor(fits, Lacking if fits is None else partial(learnt, setting, fits))
+class Asking(NamedTuple):
+    """Fits of unknown terms beside a model that a second process may be making."""
+
+    model: Model | FittedModel
+    likely: tuple[str, ...]
+    fits: Call[TermFits | None]
+
+
+def begin_asking(setting: Search, model: Model | FittedModel, likely: Sequence[str]) -> Asking:
+    """What `asked_for` with the same arguments needs, by a second process where there is one."""
+    asked = model, tuple(likely)
+    here = partial(fits_with_terms, setting, *asked)
+    return Asking(*asked, begin_call(here, fits_with_terms, setting.alone(), *asked))
+
+
+def asked_for(
+    setting: Search, model: Model | FittedModel, likely: Sequence[str] = (), asking: Asking | None = None
+) -> AskedFor:
+    """Unknown terms beside `model`. `likely`: as of `fits_with_terms`. `asking`: what was begun, if it is of the same model."""
+    if asking is not None and asking.likely == tuple(likely) and np.array_equal(asking.model.values, model.values):
+        setting.progress(Stage(FITTING_TERMS, 0.0))
+        fits = asking.fits.result()
+        setting.progress(Stage(FITTING_TERMS, 1.0))
+    else:
+        fits = fits_with_terms(setting, model, likely)
+    if fits is None:
+        return AskedFor(None, Lacking)
+    search = dataclasses.replace(fits.search, progress=setting.progress, cache=setting.cache)
+    fits = dataclasses.replace(fits, search=search)
+    return AskedFor(fits, partial(learnt, setting, fits))
 
 
 def in_place_of(setting: Search, first: Model, final: Model, asked: AskedFor | None = None) -> Lacking | None:

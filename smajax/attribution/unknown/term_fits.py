@@ -29,6 +29,7 @@ from smajax.fit.starts import nearest
 from smajax.model.effects.candidate import PRIOR_ODDS
 from smajax.model.effects.prior_width import CoefficientPrior
 
+FITTING_TERMS = "fitting unknown terms"
 INDISTINGUISHABLE = 3.0  # in log odds: twenty to one
 # Of the likeliest's log odds over no term: eleven waves leave about a hundredth of a function, and in which equation they leave
 # less of it says nothing.
@@ -225,7 +226,7 @@ def fitted_terms(
     error: float,
 ) -> list[FittedModel]:
     """Every term of `places` fitted together with the parameters of the model with `effects`, from the best of its places, in its program `among` those of all."""
-    settings = comparison_settings(FitSettings(cache=search.cache, progress=search.progress), "fitting unknown terms")
+    settings = comparison_settings(FitSettings(cache=search.cache, progress=search.progress), FITTING_TERMS)
     groups = []
     own = [(program, [term for term in terms if term in places]) for program, terms in among]
     programs = [(program, terms, *joint.restricted(program)) for program, terms in own if terms]

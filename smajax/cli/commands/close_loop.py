@@ -14,6 +14,7 @@ import typer
 from smajax.cli import completion
 from smajax.cli.options import FITS, UNMET, Json, Open, Overwrite, quantity
 from smajax.cli.terminal import browse, console, resumable, say
+from smajax.core.worker_process import OF_PROGRAMS, worker_process
 
 if TYPE_CHECKING:
     from smajax.attribution.findings import Findings
@@ -246,10 +247,11 @@ def close_loop_command(
     from smajax.cli.result_folder import check_path
 
     check_path(out)
-    loaded = load(experiment)
-    targets = check_tuning(loaded, tune, set_points) if tune else ()
     command = f"smajax close-loop {shlex.quote(str(experiment))} --out {shlex.quote(str(out))}"
-    findings, page = run_close_loop(loaded, out, command, overwrite, not json_out)
+    with worker_process(OF_PROGRAMS):  # it starts while this one imports and reads
+        loaded = load(experiment)
+        targets = check_tuning(loaded, tune, set_points) if tune else ()
+        findings, page = run_close_loop(loaded, out, command, overwrite, not json_out)
     if json_out:
         from smajax.report.json_file import findings_to_json
 

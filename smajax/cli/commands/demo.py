@@ -13,6 +13,7 @@ from smajax.cli import completion
 from smajax.cli.commands.close_loop import load, print_findings, run_close_loop, tune_on_models
 from smajax.cli.options import DEMOS, Json, Open, Overwrite
 from smajax.cli.terminal import browse
+from smajax.core.worker_process import OF_PROGRAMS, worker_process
 
 TRUE_MODEL = "true_model.toml"
 CONTROLLERS = ("pid", "sld")
@@ -49,9 +50,10 @@ def demo(
         with resources.as_file(resources.files("smajax") / "data" / "demo" / name) as folder:
             if not json_out:
                 typer.echo(f"\n=== {name} ===")
-            findings, page = run_close_loop(
-                load(folder), out / name, f"smajax demo --only {name}", overwrite, not (json_out or pages)
-            )
+            with worker_process(OF_PROGRAMS):  # it starts while this one imports and reads
+                findings, page = run_close_loop(
+                    load(folder), out / name, f"smajax demo --only {name}", overwrite, not (json_out or pages)
+                )
             if json_out:
                 from smajax.report.json_file import findings_to_json
 

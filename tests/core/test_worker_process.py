@@ -1,0 +1,150 @@
+"""A second process that calls functions: what it returns, and that the caller calls what it cannot."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from functools import partial
+
+import jax
+import numpy as np
+import pytest
+
+from smajax.core import worker_process as module
+from smajax.core.operating_system import available_cores
+from smajax.core.worker_process import VARIABLE, begin, begin_call, is_called, taken, worker_process
+
+PATIENCE = 30.0  # s
+
+
+@pytest.fixture
+def wanted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(VARIABLE)
+    monkeypatch.setattr(module, "available_cores", lambda: 2)
+
+
+@pytest.fixture
+def started(wanted: None) -> Iterator[module.Worker]:
+    with worker_process():
+        assert module._worker is not None
+        yield module._worker
+
+
+def here_only() -> str:
+    return "here"
+
+
+def test_a_call_returns_what_the_second_process_returned(started: module.Worker) -> None:
+    call = begin_call(os.getpid, os.getpid)
+    wait_for(call)
+    assert call.result() == started._process.pid != os.getpid()
+    assert call.result() == os.getpid()  # it is forgotten once it was taken
+
+
+def test_calls_are_made_in_order_and_one_may_go_first(started: module.Worker) -> None:
+    begin("long", time.sleep, (0.5,))
+    wait_for("long")
+    for key in ("second", "third"):
+        begin(key, time.time_ns, ())
+    begin("first", time.time_ns, (), first=True)
+    times = []
+    for key in ("first", "second", "third"):
+        wait_for(key)
+        found = taken(key)
+        assert found is not None
+        times.append(found[0])
+    assert times == sorted(times)
+
+
+def test_what_was_not_called_yet_is_called_here_and_not_there(started: module.Worker) -> None:
+    begin("long", time.sleep, (1.0,))
+    wait_for("long")
+    call = begin_call(here_only, os.getpid)
+    assert call.result() == "here"
+    begin("next", os.getpid, ())
+    wait_for("next")
+    assert taken("next") == (started._process.pid,)
+
+
+def test_a_function_that_fails_there_is_called_here(started: module.Worker) -> None:
+    call = begin_call(here_only, partial(int, "none"))
+    wait_for(call)
+    assert call.result() == "here"
+    call = begin_call(here_only, lambda: "there")  # which cannot be sent
+    assert not is_called(call)
+    assert call.result() == "here"
+
+
+def test_what_a_function_prints_is_no_answer(started: module.Worker) -> None:
+    call = begin_call(here_only, print, "a line")
+    wait_for(call)
+    assert call.result() is None
+
+
+def test_the_second_process_has_the_settings_of_jax_and_one_core(started: module.Worker) -> None:
+    zero = begin_call(lambda: np.zeros(()), jax.numpy.zeros, ())
+    cores = begin_call(lambda: 0, available_cores)
+    wait_for(cores)
+    found = zero.result()
+    assert isinstance(found, jax.Array)
+    assert found.dtype == np.float64
+    assert cores.result() == 1
+
+
+def test_a_process_that_has_ended_is_done_without(started: module.Worker) -> None:
+    started._process.kill()
+    started._process.wait()
+    for _ in range(2):
+        call = begin_call(here_only, os.getpid)
+        deadline = time.monotonic() + PATIENCE
+        while not is_called(call) and time.monotonic() < deadline:
+            time.sleep(0.01)
+        assert call.result() == "here"
+
+
+def test_it_gets_no_interrupt_and_ends_with_the_block(wanted: None) -> None:
+    with worker_process():
+        first = module._worker
+        assert first is not None
+        assert os.getpgid(first._process.pid) != os.getpgid(0)
+        with worker_process():
+            assert module._worker is first
+        begin("long", time.sleep, (60.0,))
+        wait_for("long")
+        begun = time.monotonic()
+    assert time.monotonic() - begun < PATIENCE
+    assert first._process.returncode is not None
+    assert not is_called("long")
+
+
+@pytest.mark.parametrize("why", ["variable", "cores", "python", "windows", "room"])
+def test_without_it_everything_is_called_here(wanted: None, monkeypatch: pytest.MonkeyPatch, why: str) -> None:
+    def no_room(*_: object, **__: object) -> None:
+        raise OSError("no room")
+
+    if why == "variable":
+        monkeypatch.setenv(VARIABLE, "none")
+    elif why == "cores":
+        monkeypatch.setattr(module, "available_cores", lambda: 1)
+    elif why == "python":
+        monkeypatch.setattr(sys, "executable", "/opt/matlab/bin/matlab")
+    elif why == "windows":
+        monkeypatch.setattr(module, "WINDOWS", True)
+    else:
+        monkeypatch.setattr(subprocess, "Popen", no_room)
+    with worker_process():
+        assert module._worker is None
+        call = begin_call(here_only, os.getpid)
+        assert call.result() == "here"
+        assert not is_called(call)
+
+
+def wait_for(key: object) -> None:
+    """Until the second process has been asked."""
+    deadline = time.monotonic() + PATIENCE
+    while not is_called(key):
+        assert time.monotonic() < deadline, "the second process does not answer"
+        time.sleep(0.01)
