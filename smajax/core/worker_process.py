@@ -16,6 +16,7 @@ from collections.abc import Callable, Hashable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing import parent_process
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -26,8 +27,9 @@ from smajax.core.serving import read, written
 Result = TypeVar("Result")
 VARIABLE = "SMAJAX_WORKER"
 NEVER = "none"
-# What an attribution has made there is of the models in these: their import takes longer than the base fit.
-OF_PROGRAMS = ("smajax.engine.native", "smajax.attribution.unknown.search")
+# What an attribution and its page ask for is in these, whose import takes longer than the base fit.
+OF_ATTRIBUTION = ("smajax.engine.native", "smajax.attribution.begun_ahead")
+OF_REPORT = ("smajax.report.html",)
 THREADS_OF = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 PROGRAM = "import sys; sys.path[:] = {}; from smajax.core.serving import serve; serve({})"
 
@@ -180,6 +182,17 @@ class Call(Generic[Result]):
         """What it returned there; where it was not called there, or failed, what `here` returns."""
         found = taken(self)
         return self.here() if found is None else found[0]
+
+
+def in_two_processes(function: Callable[..., Result], calls: Sequence[tuple[Any, ...]]) -> list[Result]:
+    """What a function of a module returns for each of `calls`, its arguments; every second one is called by the second process, where there is one."""
+    there = [begin_call(partial(function, *one), function, *one) for one in calls[1::2]]
+    here = [function(*one) for one in calls[::2]]
+    found = iter([*here, *(one.result() for one in there)])
+    in_order: list[Any] = [None] * len(calls)
+    in_order[::2] = [next(found) for _ in here]
+    in_order[1::2] = list(found)
+    return in_order
 
 
 def begin_call(here: Callable[[], Result], function: Callable[..., Result], *arguments: Any) -> Call[Result]:

@@ -22,6 +22,7 @@ from smajax.attribution.verdict import unknowns_at_bounds
 from smajax.core.display_units import chance, correlation, digits, display, label, p_value, with_error
 from smajax.core.names_of_runs import is_of_run, of_run, parameter_of
 from smajax.core.wording import and_listed, per_cent, verdict_text
+from smajax.core.worker_process import in_two_processes
 from smajax.fit.uncertainty import RemarkKind
 from smajax.report import pictures, run_plots
 from smajax.report.embedded import picture
@@ -229,17 +230,21 @@ def _runs(findings: Findings) -> list[dict[str, Any]]:
     many = len(plots) > MANY
     # Drawing takes seconds, in which the search would stand still: what unfinished pages show without it is enough for them.
     drawn = findings.remaining is not Remaining.SEARCH
+    asked = (
+        [(findings, run, _hysteresis_dpi(number, many)) for number, run in enumerate(findings.runs)] if drawn else []
+    )
+    drawings = iter(in_two_processes(pictures.run_hysteresis, asked))
     return [
         {
             "run": run,
             "noise_ratio": run.rmse_after / findings.noise_sigma if findings.noise_sigma > 0.0 else float("nan"),
             "over_time": plot,
             "hysteresis": picture(
-                pictures.run_hysteresis(findings, run, _hysteresis_dpi(number, many)) if drawn else None,
+                next(drawings, None),
                 f"Run {run.name} against the wire's temperature",
             ),
         }
-        for number, (run, plot) in enumerate(zip(findings.runs, plots, strict=True))
+        for run, plot in zip(findings.runs, plots, strict=True)
     ]
 
 

@@ -11,6 +11,7 @@ from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from smajax.core.worker_process import in_two_processes
 from smajax.report.embedded import picture
 from smajax.report.pictures import (
     AFTER,
@@ -106,9 +107,13 @@ def _key(figure: Figure, rows: list[Axes]) -> None:
 
 def series(plot: SeriesPlot, most: int = POINTS, dpi: int = DPI, drawn: bool = True) -> Markup:
     """The plot for a page, with its picture; without one where a page has so many that they are folded away."""
-    if not drawn:
+    return _for_page(plot, as_picture(plot, dpi) if drawn else None, most)
+
+
+def _for_page(plot: SeriesPlot, drawn: bytes | None, most: int) -> Markup:
+    if drawn is None:
         return moving(plot, Markup('<p class="quiet">{}: this plot needs scripts.</p>').format(plot.about), most)
-    return moving(plot, picture(as_picture(plot, dpi), plot.about), most)
+    return moving(plot, picture(drawn, plot.about), most)
 
 
 def series_of_runs(plots: Sequence[Sequence[SeriesPlot]], most: int | None = None, drawn: bool = True) -> list[Markup]:
@@ -118,7 +123,6 @@ def series_of_runs(plots: Sequence[Sequence[SeriesPlot]], most: int | None = Non
     """
     every = [plot for several in plots for plot in several]
     samples, dpi = samples_of(every) if most is None else most, COARSE if len(every) > MANY else DPI
-    return [
-        Markup("").join(series(plot, samples, dpi, drawn and number < MANY) for plot in several)
-        for number, several in enumerate(plots)
-    ]
+    asked = [plot for several in plots[:MANY] for plot in several] if drawn else []
+    pictures = iter(in_two_processes(as_picture, [(plot, dpi) for plot in asked]))
+    return [Markup("").join(_for_page(plot, next(pictures, None), samples) for plot in several) for several in plots]

@@ -15,7 +15,7 @@ import pytest
 
 from smajax.core import worker_process as module
 from smajax.core.operating_system import available_cores
-from smajax.core.worker_process import VARIABLE, begin, begin_call, is_called, taken, worker_process
+from smajax.core.worker_process import VARIABLE, begin, begin_call, in_two_processes, is_called, taken, worker_process
 
 PATIENCE = 30.0  # s
 
@@ -28,7 +28,7 @@ def wanted(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def started(wanted: None) -> Iterator[module.Worker]:
-    with worker_process():
+    with worker_process(("tests.core.test_worker_process",)):
         assert module._worker is not None
         yield module._worker
 
@@ -94,6 +94,16 @@ def test_the_second_process_has_the_settings_of_jax_and_one_core(started: module
     assert cores.result() == 1
 
 
+def test_every_second_call_is_made_there_and_the_results_are_in_order(started: module.Worker) -> None:
+    begin("ready", os.getpid, ())
+    wait_for("ready")
+    assert taken("ready") is not None  # it has imported what it needs
+    assert in_two_processes(max, [(k, 2) for k in range(5)]) == [2, 2, 2, 3, 4]
+    pids = in_two_processes(_after, [(0.5,), (0.0,)])
+    assert pids == [os.getpid(), started._process.pid]
+    assert in_two_processes(max, []) == []
+
+
 def test_a_process_that_has_ended_is_done_without(started: module.Worker) -> None:
     started._process.kill()
     started._process.wait()
@@ -140,6 +150,11 @@ def test_without_it_everything_is_called_here(wanted: None, monkeypatch: pytest.
         call = begin_call(here_only, os.getpid)
         assert call.result() == "here"
         assert not is_called(call)
+
+
+def _after(seconds: float) -> int:
+    time.sleep(seconds)
+    return os.getpid()
 
 
 def wait_for(key: object) -> None:
