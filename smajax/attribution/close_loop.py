@@ -46,7 +46,6 @@ from smajax.core.blas_threads import on_one_blas_thread
 from smajax.core.progress import Progress, Result, Stage, as_progress, quiet, report_warnings
 from smajax.core.provenance import made_with
 from smajax.core.result_cache import ResultCache
-from smajax.core.worker_process import OF_ATTRIBUTION, worker_process
 from smajax.data.experiment.record import Experiment
 from smajax.fit.identifiability import Checks, TakenAt, identifiability
 from smajax.fit.preset_priors import visible
@@ -61,7 +60,6 @@ CHECKING = "checking what these runs determine"
 
 
 @on_one_blas_thread
-@worker_process(OF_ATTRIBUTION)
 def close_loop(  # keywords, which a caller names one by one
     experiment: Experiment,
     *,

@@ -8,13 +8,13 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from smajax.attribution.asked_ahead import AskedAhead
 from smajax.attribution.findings import Findings
 from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.job import Job
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.record_error import NO_RECORDS, CorrectedRecords, OutlierRun
 from smajax.attribution.unknown.search import Lacking
-from smajax.core.worker_process import Call
 from smajax.fit.identifiability import Checks
 from smajax.fit.levenberg_marquardt import Fit
 
@@ -46,7 +46,7 @@ class Outcome:
     lacking: Lacking | None = None  # unknown terms, where they have been asked for
     superseded: tuple[str, ...] = ()
     outliers: tuple[OutlierRun, ...] = ()
-    calls: Mapping[str, tuple[Model, Call[Any]]] = field(default_factory=dict)  # by `begin_ahead`, with the model
+    asked: Mapping[str, tuple[Model, AskedAhead[Any]]] = field(default_factory=dict)  # by `begin_ahead`, with the model
 
     @property
     def one_outlier(self) -> bool:
@@ -55,5 +55,5 @@ class Outcome:
 
     def result(self, what: str, model: Model, here: Callable[[], Result]) -> Result:
         """What was begun of `model` under this name; what `here` gives where nothing was, or of another model."""
-        begun_of, call = self.calls.get(what, (None, None))
-        return call.result() if call is not None and begun_of is model else here()
+        begun_of, asked = self.asked.get(what, (None, None))
+        return asked.result() if asked is not None and begun_of is model else here()

@@ -67,7 +67,7 @@ class JointSearch:
 
     def alone(self) -> JointSearch:
         """What was fitted, for a second process, which does not search."""
-        settings = replace(self.settings, progress=quiet)
+        settings = replace(self.settings, progress=quiet, cache=self.settings.cache.alone())
         return JointSearch(
             self.joint,
             self.extent,

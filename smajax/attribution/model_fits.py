@@ -103,6 +103,7 @@ class Search:
         """The same settings for a second process, which reports nothing and records no rounds."""
         return dataclasses.replace(
             self,
+            cache=self.cache.alone(),
             progress=quiet,
             evidence={},
             rounds=[],

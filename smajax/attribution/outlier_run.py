@@ -18,6 +18,7 @@ from smajax.attribution.record_error import OutlierRun
 from smajax.fit.levenberg_marquardt import Fit
 from smajax.fit.outputs_of_runs import misfits
 
+LEAVING_OUT = "leaving out each run for good"
 SETTLED = 0.02  # of what one sample adds to the cost
 FIRST = 1e-3  # relative decrease at which the first fits end: they only tell which come near noise or halve an error, and those go on
 
@@ -41,7 +42,7 @@ def outlier_runs(setting: Search, model: Model, names: Sequence[str]) -> tuple[O
     if not model.effects:
         places.append(problem.start_values())
     starts = [Start(model.effects, place, (everyone != run).astype(float)) for run in worst for place in places]
-    stage = "leaving out each run for good"
+    stage = LEAVING_OUT
     settled = SETTLED * float((whole**2).sum() / mask.sum()) / float(problem.noise_sigma) ** 2
     factors = model.width_factors
     fits, found = setting.fit(starts, stage, enough=FIRST, settled=settled, presets=True, width_factors=factors)

@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
-from typing import Any
+from typing import IO, Any
 
 WINDOWS = os.name == "nt"
 
@@ -83,6 +83,35 @@ def started(words: Sequence[str], lock: Path, **more: Any) -> subprocess.Popen[b
         return subprocess.Popen(answering, pass_fds=(handle,), start_new_session=True, **more)
     finally:
         os.close(handle)
+
+
+def with_pipes(
+    words: Callable[[int, int], Sequence[str]], environment: dict[str, str]
+) -> tuple[subprocess.Popen[bytes], IO[bytes], IO[bytes]]:
+    """(a program that is started, a pipe to it, one from it); `words` of the ends that it has. It has no other input or output, and Ctrl-C is not its own.
+
+    Raises OSError where it cannot be started.
+    """
+    its_input, send = os.pipe()
+    receive, its_output = os.pipe()
+    try:
+        process = subprocess.Popen(
+            words(its_input, its_output),
+            pass_fds=(its_input, its_output),
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+            env=environment,
+        )
+    except OSError:
+        os.close(send)
+        os.close(receive)
+        raise
+    finally:
+        os.close(its_input)
+        os.close(its_output)
+    return process, os.fdopen(send, "wb"), os.fdopen(receive, "rb")
 
 
 def interrupt(process: int) -> bool:
@@ -182,7 +211,16 @@ def available_cores() -> int:
     """Cores that this process may use; all of the machine where the system does not say."""
     if _taken:
         return _taken[0]
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    allowed = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return max(1, min([allowed, *_quota()]))
+
+
+def _quota(cap: Path = Path("/sys/fs/cgroup/cpu.max")) -> list[int]:
+    """Cores whose time a container may take, part of one counted as one; none where there is no cap."""
+    with suppress(OSError, ValueError):
+        most, period = cap.read_text(encoding="ascii").split()
+        return [-(-int(most) // int(period))]
+    return []
 
 
 def load_average() -> float | None:

@@ -8,7 +8,7 @@ import zipfile
 import zlib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,6 +27,13 @@ def arrays(path: Path) -> dict[str, np.ndarray] | None:
         return None
 
 
+class Counts(NamedTuple):
+    """Records that were found of another run, and keys of those that were saved."""
+
+    reused: int
+    saved: frozenset[str]
+
+
 class ResultCache:
     """A folder of finished and unfinished work; without a folder, nothing is cached.
 
@@ -38,6 +45,22 @@ class ResultCache:
         self.reused = 0  # records of another run
         self._own: set[str] = set()  # keys that this one has saved
         self._saved = -np.inf
+
+    @property
+    def counts(self) -> Counts:
+        """What it has found of another run, and saved itself."""
+        return Counts(self.reused, frozenset(self._own))
+
+    def alone(self) -> ResultCache:
+        """The same folder for a second process."""
+        other = ResultCache(self.folder)
+        other._own = set(self._own)
+        return other
+
+    def add(self, counts: Counts) -> None:
+        """Count what a second process has found and saved."""
+        self.reused += counts.reused
+        self._own |= counts.saved
 
     def key(self, work: Any, *settings: object) -> str:
         """`work`: a pytree of arrays; settings: anything that can be printed, or arrays."""

@@ -1,4 +1,4 @@
-"""What the second process does: calls of functions by its standard input, what they return by its standard output, until the first one ends."""
+"""What the second process does: calls of functions by one pipe, what they return by another, until the first process ends."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import importlib
 import os
 import pickle
 import struct
-import sys
+import threading
+import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import IO, Any
@@ -14,6 +15,7 @@ from typing import IO, Any
 from smajax.core import operating_system
 
 LENGTH = struct.Struct("<Q")
+LOOKED_FOR = 0.5  # s between two looks for the first process
 
 
 def written(content: bytes) -> bytes:
@@ -24,30 +26,34 @@ def written(content: bytes) -> bytes:
 def read(pipe: IO[bytes]) -> bytes:
     """The next message. Raises EOFError where the other process has ended."""
     head = pipe.read(LENGTH.size)
-    if len(head) < LENGTH.size:
-        raise EOFError("the other process has ended")
-    content = pipe.read(*LENGTH.unpack(head))
-    if len(content) < LENGTH.unpack(head)[0]:
+    content = pipe.read(*LENGTH.unpack(head)) if len(head) == LENGTH.size else b""
+    if len(head) < LENGTH.size or len(content) < LENGTH.unpack(head)[0]:
         raise EOFError("the other process has ended")
     return content
 
 
-def serve(imports: Sequence[str]) -> None:
-    """Answer calls until there are no more."""
-    calls, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what a module prints is no answer
-    sys.stdout = sys.stderr
+def serve(imports: Sequence[str], calls: int, answers: int, parent: int) -> None:
+    """Answer calls from a pipe into another one until there are no more, or the process `parent` has ended."""
+    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
     operating_system.take_cores(1)  # the first process goes on beside
     for name in imports:
         with suppress(Exception):
             importlib.import_module(name)
-    while True:
-        try:
-            call = read(calls)
-        except EOFError:
-            return
-        answers.write(written(_answer(call)))
-        answers.flush()
+    with os.fdopen(calls, "rb") as asked, os.fdopen(answers, "wb") as told:
+        while True:
+            try:
+                call = read(asked)
+            except EOFError:
+                return
+            told.write(written(_answer(call)))
+            told.flush()
+
+
+def _end_with(parent: int) -> None:
+    """A call may take minutes, and nobody waits for it."""
+    while os.getppid() == parent:
+        time.sleep(LOOKED_FOR)
+    os._exit(0)
 
 
 def _answer(call: bytes) -> bytes:

@@ -1,92 +1,99 @@
 """A second Python process, which calls functions while this one goes on: one process runs Python on one core.
 
 `worker_process` starts it for a block. Within the block `begin` has a function called there, and `taken` gives what it returned, or nothing
-where it was not called yet or failed: then the caller calls it itself. So a study is quicker by it, and never another one.
+where it was not called yet or failed: then the caller calls it itself. It imports modules as they are on the disk, so only our own commands
+start one: a script may have changed them.
 """
 
 from __future__ import annotations
 
 import os
 import pickle
-import subprocess
 import sys
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
-from multiprocessing import parent_process
-from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from smajax.core.operating_system import WINDOWS, available_cores
+from smajax.core.operating_system import WINDOWS, available_cores, with_pipes
 from smajax.core.serving import read, written
 
 Result = TypeVar("Result")
 VARIABLE = "SMAJAX_WORKER"
-NEVER = "none"
-# What an attribution and its page ask for is in these, whose import takes longer than the base fit.
-OF_ATTRIBUTION = ("smajax.engine.native", "smajax.attribution.begun_ahead")
-OF_REPORT = ("smajax.report.html",)
+NEVER = ("none", "no", "off", "false", "0")
 THREADS_OF = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-PROGRAM = "import sys; sys.path[:] = {}; from smajax.core.serving import serve; serve({})"
+PROGRAM = "import sys; sys.path[:] = {}; from smajax.core.serving import serve; serve({}, {}, {}, {})"
+# What an attribution and its page ask for is in these, whose import takes longer than the base fit.
+OF_ATTRIBUTION = ("smajax.engine.native", "smajax.attribution.begun_ahead", "smajax.report.html")
 
 
 class Worker:
     """The process, and what it returned or will return."""
 
     def __init__(self, imports: Sequence[str]) -> None:
-        """`imports`: modules that it imports before the first call. Raises OSError where it cannot be started."""
-        # Modules are found where this process finds them; it takes no card.
-        self._process = subprocess.Popen(
-            [sys.executable, "-c", PROGRAM.format(sys.path, list(imports))],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,  # Ctrl-C is the first process's
-            env={**os.environ, **dict.fromkeys(THREADS_OF, "1"), "JAX_PLATFORMS": "cpu"},
-        )
-        self._pool = ThreadPoolExecutor(1)
-        self._lock = threading.Lock()
+        """`imports`: modules that it imports before the first call. Raises OSError or RuntimeError where it cannot be started."""
+        path = [one for one in sys.path if isinstance(one, str)]  # modules are found where this process finds them
+
+        def words(calls: int, answers: int) -> list[str]:
+            return [sys.executable, "-c", PROGRAM.format(path, list(imports), calls, answers, os.getpid())]
+
+        # It takes no card, and starts no process like itself.
+        own = {**dict.fromkeys(THREADS_OF, "1"), "JAX_PLATFORMS": "cpu", VARIABLE: NEVER[0]}
+        self._process, self._send, self._receive = with_pipes(words, {**os.environ, **own})
+        self._changed = threading.Condition()
         self._waiting: OrderedDict[Hashable, bytes] = OrderedDict()  # calls that were not sent yet
         self._called: dict[Hashable, Future[Any]] = {}
+        self._ended = False
+        try:
+            threading.Thread(target=self._go_on, daemon=True).start()
+        except RuntimeError:  # no room for another thread under a cap on memory
+            self.close()
+            raise
 
     def begin(self, key: Hashable, function: Callable[..., Any], arguments: tuple[Any, ...], first: bool) -> None:
-        """Have a function called, after those that wait or before them."""
-        with self._lock:
-            if key in self._called:
+        """Have a function called, after those that wait or before them; never raises."""
+        with self._changed:
+            if key in self._called or self._ended:
                 return
             if key not in self._waiting:
                 try:
                     self._waiting[key] = pickle.dumps((_settings(), function, arguments))
-                except Exception:  # a class of the user's script, say: then the caller calls it
+                except Exception:  # what has no name in a module, say: then the caller calls it
                     return
-                self._pool.submit(self._next)
             self._waiting.move_to_end(key, last=not first)
+            self._changed.notify()
 
-    def _next(self) -> None:
-        with self._lock:
-            if not self._waiting:  # the caller has called it
+    def _go_on(self) -> None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._waiting or self._ended)
+                if self._ended:
+                    return
+                key, call = self._waiting.popitem(last=False)
+                coming = self._called[key] = Future()
+            try:
+                self._send.write(written(call))
+                self._send.flush()
+                done, answer = pickle.loads(read(self._receive))
+            except Exception as error:  # it has ended, or says what is no answer
+                self._end()
+                coming.set_exception(error)
                 return
-            key, call = self._waiting.popitem(last=False)
-            coming = self._called[key] = Future()
-        try:
-            coming.set_result(self._answer(call))
-        except Exception as error:
-            coming.set_exception(error)
+            if done:
+                coming.set_result(answer)
+            else:
+                coming.set_exception(RuntimeError(answer))
 
-    def _answer(self, call: bytes) -> Any:
-        send, receive = self._process.stdin, self._process.stdout
-        assert send is not None
-        assert receive is not None
-        send.write(written(call))
-        send.flush()
-        done, answer = pickle.loads(read(receive))
-        if not done:
-            raise RuntimeError(answer)
-        return answer
+    def _end(self) -> None:
+        with self._changed:
+            self._ended = True
+            self._waiting.clear()
+            self._changed.notify()
+        self._process.kill()
 
     def is_called(self, key: Hashable) -> bool:
         """Whether a function has been called, and may have returned."""
@@ -94,7 +101,7 @@ class Worker:
 
     def taken(self, key: Hashable) -> tuple[Any] | None:
         """(what a function returned,), for which this waits where it was called; None where it was not, or failed. It is then forgotten."""
-        with self._lock:
+        with self._changed:
             self._waiting.pop(key, None)
             coming = self._called.pop(key, None)
         if coming is not None:
@@ -104,15 +111,11 @@ class Worker:
 
     def close(self) -> None:
         """End the process, whatever it is at."""
-        with self._lock:
-            self._waiting.clear()
-        self._process.kill()
-        self._pool.shutdown(wait=True)
+        self._end()
         self._process.wait()
-        for pipe in (self._process.stdin, self._process.stdout):
-            if pipe is not None:
-                with suppress(OSError):  # what was to be sent
-                    pipe.close()
+        for pipe in (self._send, self._receive):
+            with suppress(OSError):  # what was to be sent
+                pipe.close()
 
 
 def _settings() -> dict[str, Any]:
@@ -132,10 +135,11 @@ _worker: Worker | None = None
 def worker_process(imports: Sequence[str] = ()) -> Iterator[None]:
     """A block beside which a second process calls functions; one within another has the same process.
 
-    Without one on a single core, in a process of `multiprocessing`, on Windows, where it was never tried, and where the environment variable SMAJAX_WORKER is "none". `imports`: modules that it imports while it waits.
+    Without one on a single core, on Windows, where it was never tried, and where the environment variable SMAJAX_WORKER is "none". `imports`: modules that it imports while it waits.
     """
     global _worker
-    if _worker is not None or not _wanted():
+    wanted = not WINDOWS and os.environ.get(VARIABLE, "").lower() not in NEVER and available_cores() > 1
+    if _worker is not None or not wanted:
         yield
         return
     with suppress(OSError, RuntimeError):  # no room for another process or thread
@@ -146,14 +150,6 @@ def worker_process(imports: Sequence[str] = ()) -> Iterator[None]:
         ended, _worker = _worker, None
         if ended is not None:
             ended.close()
-
-
-def _wanted() -> bool:
-    if parent_process() is not None:  # one of several processes that share the cores already
-        return False
-    # A program that runs Python within itself is not to be started a second time.
-    is_python = Path(sys.executable or "").name.lower().startswith("python")
-    return is_python and not WINDOWS and os.environ.get(VARIABLE) != NEVER and available_cores() > 1
 
 
 def begin(key: Hashable, function: Callable[..., Any], arguments: tuple[Any, ...], first: bool = False) -> None:
@@ -184,6 +180,13 @@ class Call(Generic[Result]):
         return self.here() if found is None else found[0]
 
 
+def begin_call(here: Callable[[], Result], function: Callable[..., Result], *arguments: Any) -> Call[Result]:
+    """Have a function called by the second process, where there is one; `here` is the same call by this one, with what shows its progress."""
+    result = Call(here)
+    begin(result, function, arguments)
+    return result
+
+
 def in_two_processes(function: Callable[..., Result], calls: Sequence[tuple[Any, ...]]) -> list[Result]:
     """What a function of a module returns for each of `calls`, its arguments; every second one is called by the second process, where there is one."""
     there = [begin_call(partial(function, *one), function, *one) for one in calls[1::2]]
@@ -193,10 +196,3 @@ def in_two_processes(function: Callable[..., Result], calls: Sequence[tuple[Any,
     in_order[::2] = [next(found) for _ in here]
     in_order[1::2] = list(found)
     return in_order
-
-
-def begin_call(here: Callable[[], Result], function: Callable[..., Result], *arguments: Any) -> Call[Result]:
-    """Have a function called by the second process, where there is one; `here` is the same call by this one, with what shows its progress."""
-    result = Call(here)
-    begin(result, function, arguments)
-    return result

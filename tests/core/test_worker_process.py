@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from functools import partial
+from pathlib import Path
 
 import jax
 import numpy as np
@@ -105,14 +109,62 @@ def test_every_second_call_is_made_there_and_the_results_are_in_order(started: m
 
 
 def test_a_process_that_has_ended_is_done_without(started: module.Worker) -> None:
+    begin("long", time.sleep, (60.0,))
+    wait_for("long")
     started._process.kill()
-    started._process.wait()
+    assert taken("long") is None
     for _ in range(2):
         call = begin_call(here_only, os.getpid)
-        deadline = time.monotonic() + PATIENCE
-        while not is_called(call) and time.monotonic() < deadline:
-            time.sleep(0.01)
+        assert not is_called(call)
         assert call.result() == "here"
+
+
+def test_it_reads_nothing_from_the_user(started: module.Worker) -> None:
+    call = begin_call(here_only, input, "a question")
+    wait_for(call)
+    assert call.result() == "here"
+
+
+PRINTS = "import sys; sys.stdout.write('a line of 17 bytes'); sys.stdout.flush()"
+ENDS = """
+import os, signal, time
+from smajax.core import worker_process as module
+with module.worker_process():
+    module.begin("first", os.getpid, ())
+    while not module.is_called("first"):
+        time.sleep(0.01)
+    print(module.taken("first")[0], flush=True)
+    module.begin("long", time.sleep, (600.0,))
+    while not module.is_called("long"):
+        time.sleep(0.01)
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_it_ends_with_the_first_process_whatever_it_is_at(tmp_path: Path) -> None:
+    (tmp_path / "sitecustomize.py").write_text(PRINTS)  # is no answer either
+    path = os.pathsep.join([str(tmp_path), *(one for one in sys.path if one)])
+    environment = {**os.environ, "PYTHONPATH": path, "PYTHONUNBUFFERED": "1"}
+    environment.pop(VARIABLE)
+    done = subprocess.run(
+        [sys.executable, "-c", f"import os; os.sched_getaffinity = lambda _: (0, 1)\n{ENDS}"],
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+    )
+    assert done.returncode == -signal.SIGKILL, done.stderr
+    second = int(done.stdout.split("bytes")[-1])
+    deadline = time.monotonic() + PATIENCE
+    while Path(f"/proc/{second}").exists() and _state(second) != "Z":
+        assert time.monotonic() < deadline, "the second process goes on"
+        time.sleep(0.05)
+
+
+def _state(process: int) -> str:
+    with contextlib.suppress(OSError):
+        return Path(f"/proc/{process}/stat").read_text(encoding="ascii").rsplit(")", 1)[1].split()[0]
+    return "Z"
 
 
 def test_it_gets_no_interrupt_and_ends_with_the_block(wanted: None) -> None:
@@ -130,21 +182,24 @@ def test_it_gets_no_interrupt_and_ends_with_the_block(wanted: None) -> None:
     assert not is_called("long")
 
 
-@pytest.mark.parametrize("why", ["variable", "cores", "python", "windows", "room"])
+@pytest.mark.parametrize("why", ["variable", "cores", "windows", "room", "thread"])
 def test_without_it_everything_is_called_here(wanted: None, monkeypatch: pytest.MonkeyPatch, why: str) -> None:
     def no_room(*_: object, **__: object) -> None:
         raise OSError("no room")
 
+    def no_thread(_: object) -> None:
+        raise RuntimeError("can't start new thread")
+
     if why == "variable":
-        monkeypatch.setenv(VARIABLE, "none")
+        monkeypatch.setenv(VARIABLE, "None")
     elif why == "cores":
         monkeypatch.setattr(module, "available_cores", lambda: 1)
-    elif why == "python":
-        monkeypatch.setattr(sys, "executable", "/opt/matlab/bin/matlab")
     elif why == "windows":
         monkeypatch.setattr(module, "WINDOWS", True)
-    else:
+    elif why == "room":
         monkeypatch.setattr(subprocess, "Popen", no_room)
+    else:
+        monkeypatch.setattr(threading.Thread, "start", no_thread)
     with worker_process():
         assert module._worker is None
         call = begin_call(here_only, os.getpid)

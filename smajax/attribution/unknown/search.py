@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from smajax.attribution.asked_ahead import AskedAhead, ask_ahead
 from smajax.attribution.explained_share import EXPLAINED, explained_share
 from smajax.attribution.findings import UnknownTerm
 from smajax.attribution.formulas import formulas
@@ -36,9 +37,7 @@ from smajax.attribution.unknown.term_fits import (
     least_error,
 )
 from smajax.attribution.values_per_run import held_out_owners, held_out_residuals
-from smajax.core.progress import Stage
 from smajax.core.whiteness import correlation_time, split_runs
-from smajax.core.worker_process import Call, begin_call
 from smajax.fit.integration import unlimited, with_integration
 from smajax.fit.outputs_of_runs import misfits
 from smajax.fit.sensitivity import Sensitivity, sensitivity
@@ -140,14 +139,13 @@ class Asking(NamedTuple):
 
     model: Model | FittedModel
     likely: tuple[str, ...]
-    fits: Call[TermFits | None]
+    fits: AskedAhead[TermFits | None]
 
 
 def begin_asking(setting: Search, model: Model | FittedModel, likely: Sequence[str]) -> Asking:
     """What `asked_for` with the same arguments needs, by a second process where there is one."""
-    asked = model, tuple(likely)
-    here = partial(fits_with_terms, setting, *asked)
-    return Asking(*asked, begin_call(here, fits_with_terms, setting.alone(), *asked))
+    of_model = model, tuple(likely)
+    return Asking(*of_model, ask_ahead(FITTING_TERMS, setting, fits_with_terms, *of_model))
 
 
 def asked_for(
@@ -155,9 +153,7 @@ def asked_for(
 ) -> AskedFor:
     """Unknown terms beside `model`. `likely`: as of `fits_with_terms`. `asking`: what was begun, if it is of the same model."""
     if asking is not None and asking.likely == tuple(likely) and np.array_equal(asking.model.values, model.values):
-        setting.progress(Stage(FITTING_TERMS, 0.0))
         fits = asking.fits.result()
-        setting.progress(Stage(FITTING_TERMS, 1.0))
     else:
         fits = fits_with_terms(setting, model, likely)
     if fits is None:

@@ -14,7 +14,7 @@ import typer
 from smajax.cli import completion
 from smajax.cli.options import FITS, UNMET, Json, Open, Overwrite, quantity
 from smajax.cli.terminal import browse, console, resumable, say
-from smajax.core.worker_process import OF_ATTRIBUTION, OF_REPORT, worker_process
+from smajax.core.worker_process import OF_ATTRIBUTION, worker_process
 
 if TYPE_CHECKING:
     from smajax.attribution.findings import Findings
@@ -248,7 +248,7 @@ def close_loop_command(
 
     check_path(out)
     command = f"smajax close-loop {shlex.quote(str(experiment))} --out {shlex.quote(str(out))}"
-    with worker_process((*OF_ATTRIBUTION, *OF_REPORT)):  # it starts while this one imports and reads
+    with worker_process(OF_ATTRIBUTION):  # it starts while this one imports and reads
         loaded = load(experiment)
         targets = check_tuning(loaded, tune, set_points) if tune else ()
         findings, page = run_close_loop(loaded, out, command, overwrite, not json_out)

@@ -13,7 +13,7 @@ from smajax.cli import completion
 from smajax.cli.commands.close_loop import load, print_findings, run_close_loop, tune_on_models
 from smajax.cli.options import DEMOS, Json, Open, Overwrite
 from smajax.cli.terminal import browse
-from smajax.core.worker_process import OF_ATTRIBUTION, OF_REPORT, worker_process
+from smajax.core.worker_process import OF_ATTRIBUTION, worker_process
 
 TRUE_MODEL = "true_model.toml"
 CONTROLLERS = ("pid", "sld")
@@ -50,7 +50,7 @@ def demo(
         with resources.as_file(resources.files("smajax") / "data" / "demo" / name) as folder:
             if not json_out:
                 typer.echo(f"\n=== {name} ===")
-            with worker_process((*OF_ATTRIBUTION, *OF_REPORT)):  # it starts while this one imports and reads
+            with worker_process(OF_ATTRIBUTION):  # it starts while this one imports and reads
                 findings, page = run_close_loop(
                     load(folder), out / name, f"smajax demo --only {name}", overwrite, not (json_out or pages)
                 )
