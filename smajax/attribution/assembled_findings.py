@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 
 from smajax.attribution.assumed_parameters import assumed, expansion_not_given
-from smajax.attribution.averaged_prediction import Averaged, averaged, with_averages
-from smajax.attribution.begun_ahead import AVERAGED, UNKNOWN_TERMS
+from smajax.attribution.averaged_prediction import Averaged, with_averages
+from smajax.attribution.begun_ahead import average_of, terms_beside
 from smajax.attribution.confounders import confounders
 from smajax.attribution.context import Context, Outcome
 from smajax.attribution.final_model_findings import effects_found, parameters_found, priors_found
 from smajax.attribution.findings import Findings, Rejected, Remaining, Verdict
 from smajax.attribution.fitted_sets import JointSearch
-from smajax.attribution.held_out import Compared, compare, every_run
+from smajax.attribution.held_out import Compared, compare
 from smajax.attribution.input_of_run import as_fitted
 from smajax.attribution.job import effects_excluded
 from smajax.attribution.model_fits import Model
 from smajax.attribution.saved_model import fit_run_states, saved_model
 from smajax.attribution.step_size_check import integration_error_of
-from smajax.attribution.unknown.search import Lacking, unknown_terms
+from smajax.attribution.unknown.search import Lacking
 from smajax.attribution.verdict import verdict_of
 from smajax.core.progress import Stage
 
@@ -28,11 +27,10 @@ WRITING = "standard errors and pictures"
 
 def unknown_terms_of(context: Context, outcome: Outcome, verdict: Verdict) -> tuple[Lacking, tuple[str, ...]]:
     """(unknown terms, effects that they supersede): sought where something is missing that is in all runs."""
-    setting, lacking, final = context.setting, outcome.lacking, outcome.final
+    setting, lacking = context.setting, outcome.lacking
     if lacking is None:
         missing = verdict in (Verdict.PARTLY_EXPLAINED, Verdict.NOT_IN_LIBRARY) and not outcome.one_outlier
-        here = partial(unknown_terms, setting, final)
-        lacking = outcome.result(UNKNOWN_TERMS, final, here) if missing else Lacking()
+        lacking = terms_beside(context, outcome, outcome.final) if missing else Lacking()
     left_out = lacking.terms[0].left_out_after if lacking.terms else None
     if left_out is not None and not setting.predicts(left_out):
         return Lacking(), ()
@@ -72,9 +70,7 @@ def findings_of(
     effects = effects_found(job, setting, final, after, search.detectable or None, search.traced, scored=not brief)
     average = Averaged()
     if len(job.fit_runs) > 1 and not brief:  # else none can be left out, which the band is made of
-        clocks = {run.name: len(run.time) for run in experiment.runs}
-        here = partial(averaged, setting, search, final, every_run(job), base, clocks)
-        average = outcome.result(AVERAGED, final, here)
+        average = average_of(context, outcome, final)
         runs = with_averages(runs, average.runs)
     states = {run.name: run.states for run in runs}
     extended_model = base_model = saved_model(job, setting, search, final, after, average, states)

@@ -1,38 +1,89 @@
-"""What is asked after the search, begun by a second process as soon as the search has ended: it is asked of the model that the search ends with, as a rule."""
+"""What is asked after the search, each question once: begun by a second process when the search has ended, and answered when it is asked.
+
+It is asked of the model that the search ends with, as a rule; of another one this process answers.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
-from smajax.attribution.asked_ahead import AskedAhead, ask_ahead
-from smajax.attribution.averaged_prediction import averaged
+from smajax.attribution.asked_ahead import ask_ahead
+from smajax.attribution.averaged_prediction import Averaged, averaged
 from smajax.attribution.context import Context, Outcome
 from smajax.attribution.held_out import every_run
 from smajax.attribution.model_fits import Model
 from smajax.attribution.outlier_run import LEAVING_OUT, outlier_runs
-from smajax.attribution.unknown.search import unknown_terms
+from smajax.attribution.record_error import OutlierRun
+from smajax.attribution.unknown.search import Lacking, unknown_terms
 from smajax.attribution.unknown.term_fits import FITTING_TERMS
 
-OUTLIERS_OF_BASE, OUTLIERS = "outlier runs of the base model", "outlier runs"
-AVERAGING = "averaging the likely models"
-UNKNOWN_TERMS, AVERAGED = "unknown terms", "average of the likely models"
+
+class _Question(NamedTuple):
+    """A function of the search's settings and of these arguments; the stage that is shown while this process waits for it."""
+
+    stage: str
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...]
+
+
+def _without_runs(context: Context, outcome: Outcome, model: Model) -> _Question:
+    return _Question(LEAVING_OUT, outlier_runs, (model, [run.name for run in context.job.fit_runs]))
+
+
+def _with_terms(context: Context, outcome: Outcome, model: Model) -> _Question:
+    return _Question(FITTING_TERMS, unknown_terms, (model,))
+
+
+def _on_average(context: Context, outcome: Outcome, model: Model) -> _Question:
+    clocks = {run.name: len(run.time) for run in context.job.experiment.runs}
+    of_search = outcome.search.alone(), model, every_run(context.job), outcome.base, clocks
+    return _Question("averaging the likely models", averaged, of_search)
+
+
+Asks = Callable[[Context, Outcome, Model], _Question]
 
 
 def begin_ahead(context: Context, outcome: Outcome) -> Outcome:
     """`outcome` with what a second process, where there is one, may have done by the time when it is asked."""
-    setting, search, base, final = context.setting, outcome.search, outcome.base, outcome.final
-    if search.wrong_record is not None:
+    setting, base, final = context.setting, outcome.base, outcome.final
+    if outcome.search.wrong_record is not None:
         return outcome
-    names = [run.name for run in context.job.fit_runs]
-    asked: dict[str, tuple[Model, AskedAhead[Any]]] = {}
+    questions: list[tuple[Asks, Model]] = []
     if not setting.is_noise(final):
-        asked[OUTLIERS_OF_BASE] = base, ask_ahead(LEAVING_OUT, setting, outlier_runs, base, names)
-        if final.effects:
-            asked[OUTLIERS] = final, ask_ahead(LEAVING_OUT, setting, outlier_runs, final, names)
-        asked[UNKNOWN_TERMS] = final, ask_ahead(FITTING_TERMS, setting, unknown_terms, final)
+        questions += [(_without_runs, base), *([(_without_runs, final)] if final.effects else []), (_with_terms, final)]
     if len(context.job.fit_runs) > 1:
-        clocks = {run.name: len(run.time) for run in context.job.experiment.runs}
-        of_search = search.alone(), final, every_run(context.job), base, clocks
-        asked[AVERAGED] = final, ask_ahead(AVERAGING, setting, averaged, *of_search)
-    return replace(outcome, asked=asked)
+        questions.append((_on_average, final))
+
+    def begun(asks: Asks, model: Model) -> Any:
+        stage, function, arguments = asks(context, outcome, model)
+        return asks, model, ask_ahead(stage, setting, function, *arguments)
+
+    return replace(outcome, asked=tuple(begun(*one) for one in questions))
+
+
+def _answer(asks: Asks, context: Context, outcome: Outcome, model: Model) -> Any:
+    for asked, begun_of, answer in outcome.asked:
+        if asked is asks and begun_of is model:
+            return answer.result()
+    _, function, arguments = asks(context, outcome, model)
+    return function(context.setting, *arguments)
+
+
+def outliers_of(context: Context, outcome: Outcome, model: Model) -> tuple[OutlierRun, ...]:
+    """`outlier_runs` of a model."""
+    found: tuple[OutlierRun, ...] = _answer(_without_runs, context, outcome, model)
+    return found
+
+
+def terms_beside(context: Context, outcome: Outcome, model: Model) -> Lacking:
+    """`unknown_terms` beside a model."""
+    found: Lacking = _answer(_with_terms, context, outcome, model)
+    return found
+
+
+def average_of(context: Context, outcome: Outcome, model: Model) -> Averaged:
+    """`averaged`, every run by the likely models where `model` is the likeliest."""
+    found: Averaged = _answer(_on_average, context, outcome, model)
+    return found

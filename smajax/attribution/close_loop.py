@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.assembled_findings import findings_of, known_so_far
-from smajax.attribution.begun_ahead import OUTLIERS, OUTLIERS_OF_BASE, begin_ahead
+from smajax.attribution.begun_ahead import begin_ahead, outliers_of
 from smajax.attribution.config import AttributionConfig
 from smajax.attribution.context import Context, Interim, Outcome
 from smajax.attribution.declared_priors import of_unknowns
@@ -34,9 +34,8 @@ from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.neutral_at_base import check_neutral
 from smajax.attribution.optimum import likeliest_so_far
-from smajax.attribution.outlier_run import outlier_runs
 from smajax.attribution.reasons import NoiseWithoutRun, PredictsTooLittle
-from smajax.attribution.record_error import NO_RECORDS, CorrectedRecords, FoundRecordErrors, NotConfirmed, OutlierRun
+from smajax.attribution.record_error import NO_RECORDS, CorrectedRecords, FoundRecordErrors, NotConfirmed
 from smajax.attribution.record_fits import MOST_LEFT
 from smajax.attribution.same_as_parameters import said_by_parameters
 from smajax.attribution.step_size_check import finer_integration
@@ -190,14 +189,12 @@ def with_records_corrected(context: Context, logged: Experiment | None = None) -
     `logged`: the experiment with all runs as they were logged; None: that of `context`.
     """
     begun, logged = context, logged or context.job.experiment
-    context, outcome = searched_finely(context)
-    first = context, outcome = context, begin_ahead(context, outcome)
+    first = context, outcome = searched_finely(context)
     while (wrong := wrong_record(context, outcome)) is not None:
         context.setting.progress(Result(wrong))
         records = replace(context.records, errors=(*context.records.errors, *wrong.errors))
         context = _again(context, reduce(corrected, wrong.errors, context.job.experiment), records)
         context, outcome = searched_finely(context, (outcome.search, wrong.beside))
-        outcome = begin_ahead(context, outcome)
     errors = context.records.errors
     stand = standing(errors, outcome.search, outcome.final, len(context.job.fit_runs))
     if context.records.on_trial and not leaves_little(context, outcome.final):
@@ -229,7 +226,7 @@ def leaves_little(context: Context, model: Model) -> bool:
 def searched_finely(
     context: Context, before: tuple[JointSearch, tuple[str, ...]] | None = None
 ) -> tuple[Context, Outcome]:
-    """The search; where the model that it ends with asks for a finer integration, on from its likeliest models with that.
+    """The search; where the model that it ends with asks for a finer integration, on from its likeliest models with that. What comes after is begun.
 
     `before`: the search before a record was corrected, and the effects beside which it was wrong, from which this one begins.
     """
@@ -242,11 +239,11 @@ def searched_finely(
         return context, outcome
     finer = finer_integration(setting, outcome.final.effects, outcome.final.values, beside_what_is_left=True)
     if finer is None:
-        return context, outcome
+        return context, begin_ahead(context, outcome)
     given = context.job.experiment, setting.cache, setting.progress, context.seed, setting.config, context.interim
     context = prepared(*given, finer, context.records)
     context.setting.rounds += setting.rounds
-    return context, Outcome(*search_again(context.setting, context.base, outcome.search))
+    return context, begin_ahead(context, Outcome(*search_again(context.setting, context.base, outcome.search)))
 
 
 def wrong_record(context: Context, outcome: Outcome) -> FoundRecordErrors | None:
@@ -305,17 +302,11 @@ def against_an_outlier_run(context: Context, outcome: Outcome) -> Outcome:
     setting, base, final = context.setting, outcome.base, outcome.final
     if setting.is_noise(final):
         return outcome
-
-    names = [run.name for run in context.job.fit_runs]
-
-    def outliers(what: str, model: Model) -> tuple[OutlierRun, ...]:
-        return outcome.result(what, model, partial(outlier_runs, setting, model, names))
-
-    outcome = replace(outcome, outliers=outliers(OUTLIERS_OF_BASE, base))
+    outcome = replace(outcome, outliers=outliers_of(context, outcome, base))
     if not final.effects:
         return outcome
     if not outcome.one_outlier:
-        return replace(outcome, outliers=outliers(OUTLIERS, final) or outcome.outliers)
+        return replace(outcome, outliers=outliers_of(context, outcome, final) or outcome.outliers)
     setting.set_aside(final, NoiseWithoutRun(outcome.outliers[0].run))
     return replace(outcome, final=base, lacking=None)
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +18,6 @@ from smajax.attribution.unknown.search import Lacking
 from smajax.fit.identifiability import Checks
 from smajax.fit.levenberg_marquardt import Fit
 
-Result = TypeVar("Result")
 Interim = Callable[[Findings], object]  # gets what is known of an attribution that goes on
 
 
@@ -46,14 +45,9 @@ class Outcome:
     lacking: Lacking | None = None  # unknown terms, where they have been asked for
     superseded: tuple[str, ...] = ()
     outliers: tuple[OutlierRun, ...] = ()
-    asked: Mapping[str, tuple[Model, AskedAhead[Any]]] = field(default_factory=dict)  # by `begin_ahead`, with the model
+    asked: tuple[tuple[object, Model, AskedAhead[Any]], ...] = ()  # by `begin_ahead`: a question, of which model
 
     @property
     def one_outlier(self) -> bool:
         """Whether without one run all the others are explained."""
         return any(run.residual_is_noise for run in self.outliers)
-
-    def result(self, what: str, model: Model, here: Callable[[], Result]) -> Result:
-        """What was begun of `model` under this name; what `here` gives where nothing was, or of another model."""
-        begun_of, asked = self.asked.get(what, (None, None))
-        return asked.result() if asked is not None and begun_of is model else here()

@@ -100,10 +100,11 @@ def record_errors(
 
 def begin_record_errors(setting: Search, hosts: Sequence[Host], runs: Sequence[Run]) -> None:
     """Have a second process, where there is one, make the programs of `record_errors` with these arguments."""
-    names = [run.name for run in runs]
-    if len(runs) >= LEAST_RUNS:
-        beside = zip(hosts, _carried(setting, hosts), strict=True)
-        begin_derivatives([with_record_errors(setting, host, names, more)[0] for host, more in beside])
+    if len(runs) < LEAST_RUNS:
+        return
+    for host, more in zip(hosts, _carried(setting, hosts), strict=True):
+        own, slots = setting.restricted((*host.effects, *more))
+        begin_derivatives([with_record_errors(own, host.values[slots], [run.name for run in runs])[0]])
 
 
 def _carried(setting: Search, hosts: Sequence[Host]) -> list[list[str]]:

@@ -222,9 +222,7 @@ class _Stage:
     def _asked(self, search: JointSearch, found: FittedModel) -> AskedFor:
         """Unknown functions beside the base model, whose values of presets are free in them as well. `found`: the likeliest model, beside which they may be asked for when the search has ended."""
         if not self.asked:
-            # The effects that were likely when it was begun: with or without a second process the same programs.
-            likely = found.effects if self.asking is None else self.asking.likely
-            self.asked.append(asked_for(self.setting, search.fitted[()], likely, self.asking))
+            self.asked.append(asked_for(self.setting, search.fitted[()], found.effects, self.asking))
         search.lacking = self.asked[0]
         return self.asked[0]
 

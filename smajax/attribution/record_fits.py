@@ -148,12 +148,13 @@ class Beside:
     @classmethod
     def of(cls, setting: Search, host: Host, runs: Sequence[str], carried: Sequence[str] = ()) -> Beside | None:
         """None where no record can be wrong in any of the ways known. `carried`: effects that its program has as well, off."""
-        problem, kinds = with_record_errors(setting, host, runs, carried)
+        own, slots = setting.restricted((*host.effects, *carried))
+        values = host.values[slots]
+        problem, kinds = with_record_errors(own, values, runs)
         every = {of_run(kind.coefficient, run): (kind, run) for run in runs for kind in kinds}
         # What was corrected before is a parameter of the base model.
         possible = {name: one for name, one in every.items() if name not in setting.unknowns}
-        own, slots = setting.restricted((*host.effects, *carried))
-        (left,) = misfits(own, [host.values[slots]])
+        (left,) = misfits(own, [values])
         return cls(setting, host, _with_events(setting, host, problem, possible), possible, left) if possible else None
 
     def singly(self) -> list[Fit]:
@@ -249,17 +250,14 @@ class Beside:
         return found
 
 
-def with_record_errors(
-    setting: Search, host: Host, runs: Sequence[str], carried: Sequence[str] = ()
-) -> tuple[Problem, list[Kind]]:
-    """(the runs by a host with every error of a record, at none; the kinds of these). `carried`: as of `Beside.of`."""
-    own, slots = setting.restricted((*host.effects, *carried))
-    values = jnp.asarray(host.values[slots])
-    system, known = own.system_at(values), own.per_run.names
+def with_record_errors(own: Problem, values: np.ndarray, runs: Sequence[str]) -> tuple[Problem, list[Kind]]:
+    """(`own` at `values` (P,) with every error of a record, at none; the kinds of these)."""
+    here = jnp.asarray(values)
+    system, known = own.system_at(here), own.per_run.names
     kinds = [kind for kind in KINDS if kind.coefficient in own.per_run.single or _possible(kind, system)]
     fresh = [kind.coefficient for kind in kinds if kind.coefficient not in known]
     whole = with_effects(system, [name.split(".")[0] for name in fresh])
-    start = jnp.concatenate([own.per_run_at(values), jnp.zeros((len(runs), len(fresh)))], axis=1)
+    start = jnp.concatenate([own.per_run_at(here), jnp.zeros((len(runs), len(fresh)))], axis=1)
     return own.with_system(whole, per_run=PerRun((*known, *fresh), tuple(runs), start, own.per_run.single)), kinds
 
 

@@ -16,6 +16,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 from types import FrameType
 from typing import IO, Any
@@ -215,12 +216,13 @@ def available_cores() -> int:
     return max(1, min([allowed, *_quota()]))
 
 
-def _quota(cap: Path = Path("/sys/fs/cgroup/cpu.max")) -> list[int]:
+@cache
+def _quota(cap: Path = Path("/sys/fs/cgroup/cpu.max")) -> tuple[int, ...]:
     """Cores whose time a container may take, part of one counted as one; none where there is no cap."""
     with suppress(OSError, ValueError):
         most, period = cap.read_text(encoding="ascii").split()
-        return [-(-int(most) // int(period))]
-    return []
+        return (-(-int(most) // int(period)),)
+    return ()
 
 
 def load_average() -> float | None:

@@ -152,6 +152,11 @@ def worker_process(imports: Sequence[str] = ()) -> Iterator[None]:
             ended.close()
 
 
+def is_there() -> bool:
+    """Whether there is a second process."""
+    return _worker is not None
+
+
 def begin(key: Hashable, function: Callable[..., Any], arguments: tuple[Any, ...], first: bool = False) -> None:
     """Have a function of a module called by the second process, where there is one. `first`: before those that wait."""
     if _worker is not None:
@@ -190,9 +195,7 @@ def begin_call(here: Callable[[], Result], function: Callable[..., Result], *arg
 def in_two_processes(function: Callable[..., Result], calls: Sequence[tuple[Any, ...]]) -> list[Result]:
     """What a function of a module returns for each of `calls`, its arguments; every second one is called by the second process, where there is one."""
     there = [begin_call(partial(function, *one), function, *one) for one in calls[1::2]]
-    here = [function(*one) for one in calls[::2]]
-    found = iter([*here, *(one.result() for one in there)])
-    in_order: list[Any] = [None] * len(calls)
-    in_order[::2] = [next(found) for _ in here]
-    in_order[1::2] = list(found)
-    return in_order
+    results: list[Any] = [None] * len(calls)
+    results[::2] = [function(*one) for one in calls[::2]]
+    results[1::2] = [one.result() for one in there]
+    return results

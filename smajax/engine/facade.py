@@ -245,23 +245,22 @@ class Wanted(NamedTuple):
 def begin_programs(wanted: Sequence[Wanted], first: bool = False) -> None:
     """Have the second process make them, where there is one (`worker_process`); `program` then gives them. `first`: before those that it was to make before."""
     engine = engine_of()
-    if engine == "xla" or not by_machine_code():
-        return
-    from smajax.engine.native import machine_code
+    if engine != "xla" and by_machine_code() and worker_process.is_there():
+        from smajax.engine.native import machine_code
 
-    for one in wanted:
-        if (key := one.key(engine)) not in _programs:
-            worker_process.begin(key, machine_code, tuple(one), first)
+        for one in wanted:
+            if (key := one.key(engine)) not in _programs:
+                worker_process.begin(key, machine_code, tuple(one), first)
 
 
 def programs(wanted: Sequence[Wanted]) -> None:
     """Make several, for `program` to give: some by the second process, where there is one, and here each compiled beside the tracing of the next."""
     begin_programs(wanted[1:], first=True)
-    engine, left, made = engine_of(), list(wanted), []
+    engine, made = engine_of(), []
+    left = {one.key(engine): one for one in wanted}
     while left:
-        here = next((one for one in left if not worker_process.is_called(one.key(engine))), left[0])
-        left.remove(here)
-        made.append(program(**here._asdict(), beside=True))
+        key = next((key for key in left if not worker_process.is_called(key)), next(iter(left)))
+        made.append(program(**left.pop(key)._asdict(), beside=True))
     for one in made:
         one.wait()
 

@@ -84,9 +84,9 @@ class NativeProgram:
             self._kernel = _done(_kernel, made.code, layout)
         else:
             text, layout = _translated(made, alone, along)
-            make = _done if not beside else _begun
+            make = _begun if beside else _done
             self._kernel = make(_compiled_kernel, text, layout, quickly)
-        self.scratch = layout.scratch
+        self.scratch = layout.scratch  # memory that a thread works in, bytes
         self._names, self._along, self._layout = names, along, layout
         self._shared = [np.dtype(kind) for kind in layout.shared]
 

@@ -185,11 +185,10 @@ def _derivatives_of(problems: Sequence[Problem]) -> list[Wanted]:
     """What `predicted_and_derivatives` of these problems runs."""
     wanted = []
     for problem in problems:
-        nothing = np.zeros((1, len(problem.names)))
-        for number, run in enumerate(_runs(problem)):
-            at = _of_run(problem, nothing, number)
-            names = {**_columns("value", at), **_columns("tangent", at)}
-            wanted.append(_wanted(problem, _along, run, names))
+        at = _of_run(problem, np.zeros((1, len(problem.names))), 0)
+        names = {**_columns("value", at), **_columns("tangent", at)}
+        # All runs are packed to one length, and share a program.
+        wanted.append(_wanted(problem, _along, _runs(problem)[0], names))
     return wanted
 
 
@@ -215,12 +214,13 @@ def predicted_and_derivatives(
     if directions == 0:
         return predicted_at(problem, points), np.zeros((count, 0, *problem.batch.output.shape))
     asked = np.ones((count, problem.batch.runs), bool) if asked is None else asked
-    needed, calls = [], list[Callable[[int], tuple[np.ndarray, np.ndarray]]]()
-    for number, run in enumerate(_runs(problem)):
+    needed, runs, scalars = [], _runs(problem), []
+    for number in range(len(runs)):
         at, along = (_of_run(problem, part, number) for part in (points, tangents))
         needed.append(NeededDirections.of(at, along, asked[:, number], directions_of(problem)))
-        scalars = {**_columns("value", needed[-1].points), **_columns("tangent", needed[-1].tangents)}
-        calls.append(partial(_program(problem, _along, run, scalars), run, scalars))  # and the number of threads
+        scalars.append({**_columns("value", needed[-1].points), **_columns("tangent", needed[-1].tangents)})
+    made = _program(problem, _along, runs[0], scalars[0])  # all runs are packed to one length, and share it
+    calls = [partial(made, run, own) for run, own in zip(runs, scalars, strict=True)]  # and the number of threads
     results = _side_by_side(calls)
     predicted = [own.predicted(value[:, 0]) for own, (value, _) in zip(needed, results, strict=True)]
     derivatives = [own.derivatives(along) for own, (_, along) in zip(needed, results, strict=True)]

@@ -230,21 +230,16 @@ def _runs(findings: Findings) -> list[dict[str, Any]]:
     many = len(plots) > MANY
     # Drawing takes seconds, in which the search would stand still: what unfinished pages show without it is enough for them.
     drawn = findings.remaining is not Remaining.SEARCH
-    asked = (
-        [(findings, run, _hysteresis_dpi(number, many)) for number, run in enumerate(findings.runs)] if drawn else []
-    )
-    drawings = iter(in_two_processes(pictures.run_hysteresis, asked))
+    asked = [(findings, run, _hysteresis_dpi(number, many)) for number, run in enumerate(findings.runs)]
+    drawings = in_two_processes(pictures.run_hysteresis, asked) if drawn else [None] * len(asked)
     return [
         {
             "run": run,
             "noise_ratio": run.rmse_after / findings.noise_sigma if findings.noise_sigma > 0.0 else float("nan"),
             "over_time": plot,
-            "hysteresis": picture(
-                next(drawings, None),
-                f"Run {run.name} against the wire's temperature",
-            ),
+            "hysteresis": picture(drawing, f"Run {run.name} against the wire's temperature"),
         }
-        for run, plot in zip(findings.runs, plots, strict=True)
+        for run, plot, drawing in zip(findings.runs, plots, drawings, strict=True)
     ]
 
 

@@ -9,9 +9,10 @@ from typing import Any
 
 import pytest
 
-from smajax.attribution.begun_ahead import AVERAGED, OUTLIERS, OUTLIERS_OF_BASE, UNKNOWN_TERMS
+from smajax.attribution import begun_ahead
 from smajax.attribution.close_loop import close_loop
-from smajax.attribution.context import Outcome
+from smajax.attribution.context import Context, Outcome
+from smajax.attribution.model_fits import Model
 from smajax.core import worker_process as module
 from smajax.core.worker_process import OF_ATTRIBUTION, VARIABLE, Call, worker_process
 from smajax.data.experiment.load import load_experiment
@@ -57,8 +58,8 @@ def test_what_is_said_is_the_same_and_every_call_was_made_there(monkeypatch: pyt
     monkeypatch.delenv(VARIABLE)
     monkeypatch.setattr(module, "available_cores", lambda: 2)
     there: Counter[bool] = Counter()
-    asked: Counter[str] = Counter()
-    result, of_outcome = Call.result, Outcome.result
+    asked: list[tuple[Any, tuple[str, ...]]] = []
+    result, answer = Call.result, begun_ahead._answer
 
     def counted(call: Call[Any]) -> Any:
         worker = module._worker
@@ -67,12 +68,12 @@ def test_what_is_said_is_the_same_and_every_call_was_made_there(monkeypatch: pyt
         there[worker.is_called(call) or call in worker._waiting] += 1
         return result(call)
 
-    def noted(outcome: Outcome, what: str, *rest: Any) -> Any:
-        asked[what] += 1
-        return of_outcome(outcome, what, *rest)
+    def noted(asks: Any, context: Context, outcome: Outcome, model: Model) -> Any:
+        asked.append((asks, model.effects))
+        return answer(asks, context, outcome, model)
 
     monkeypatch.setattr(Call, "result", counted)
-    monkeypatch.setattr(Outcome, "result", noted)
+    monkeypatch.setattr(begun_ahead, "_answer", noted)
     taken: list[bool] = []
     of_worker = module.Worker.taken
 
@@ -90,8 +91,5 @@ def test_what_is_said_is_the_same_and_every_call_was_made_there(monkeypatch: pyt
     assert not there[False]
     assert taken
     assert all(taken)
-    assert (
-        {OUTLIERS_OF_BASE, AVERAGED, UNKNOWN_TERMS}
-        <= set(asked)
-        <= {OUTLIERS_OF_BASE, OUTLIERS, AVERAGED, UNKNOWN_TERMS}
-    )
+    assert (begun_ahead._without_runs, ()) in asked  # of the base model
+    assert {asks for asks, _ in asked} == {begun_ahead._without_runs, begun_ahead._with_terms, begun_ahead._on_average}

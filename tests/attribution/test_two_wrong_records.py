@@ -165,7 +165,6 @@ def _loop_with_a_trial(
         ("searched_finely", searched),
         ("wrong_record", wrong),
         ("standing", standing),
-        ("begin_ahead", lambda _, outcome: outcome),
     ):
         monkeypatch.setattr(loop, name, instead)
     final, outcome = loop.with_records_corrected(context(experiment))

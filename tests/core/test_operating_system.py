@@ -10,9 +10,9 @@ from smajax.core.operating_system import _quota
 
 
 @pytest.mark.parametrize(
-    ("said", "cores"), [("max 100000", []), ("100000 100000", [1]), ("150000 100000", [2]), ("", []), (None, [])]
+    ("said", "cores"), [("max 100000", ()), ("100000 100000", (1,)), ("150000 100000", (2,)), ("", ()), (None, ())]
 )
-def test_the_cap_of_a_container_on_cores_is_read(said: str | None, cores: list[int], tmp_path: Path) -> None:
+def test_the_cap_of_a_container_on_cores_is_read(said: str | None, cores: tuple[int, ...], tmp_path: Path) -> None:
     cap = tmp_path / "cpu.max"
     if said is not None:
         cap.write_text(f"{said}\n")

@@ -151,11 +151,11 @@ def begin_asking(setting: Search, model: Model | FittedModel, likely: Sequence[s
 def asked_for(
     setting: Search, model: Model | FittedModel, likely: Sequence[str] = (), asking: Asking | None = None
 ) -> AskedFor:
-    """Unknown terms beside `model`. `likely`: as of `fits_with_terms`. `asking`: what was begun, if it is of the same model."""
-    if asking is not None and asking.likely == tuple(likely) and np.array_equal(asking.model.values, model.values):
+    """Unknown terms beside `model`. `likely`: as of `fits_with_terms`. `asking`: what was begun, which counts if it is of the same model; its `likely` do anyhow, so that with or without a second process the programs are the same."""
+    if asking is not None and np.array_equal(asking.model.values, model.values):
         fits = asking.fits.result()
     else:
-        fits = fits_with_terms(setting, model, likely)
+        fits = fits_with_terms(setting, model, likely if asking is None else asking.likely)
     if fits is None:
         return AskedFor(None, Lacking)
     search = dataclasses.replace(fits.search, progress=setting.progress, cache=setting.cache)
