@@ -43,6 +43,7 @@ def run_close_loop(
 ) -> tuple[Findings, Path]:
     """The findings and the path of their page, in the folder `out`. Raises FolderTaken."""
     from smajax.attribution.close_loop import close_loop
+    from smajax.attribution.findings import Remaining
     from smajax.cli.progress_display import displayed
     from smajax.cli.result_folder import claimed
     from smajax.cli.written_beside import written_beside
@@ -58,17 +59,16 @@ def run_close_loop(
         in_words = narrated(progress, loaded.output_unit, loaded.output_name)
         shown = _rounds_shown(out)
 
-        def write(known: Findings) -> Path:
-            return write_report(known, out, loaded.path)
-
-        with written_beside(write) as begin_page:
+        with written_beside(write_report, out, loaded.path) as begin_page:
 
             def interim(known: Findings) -> float:
                 # A loop that resumes knows less at first than the page of the one that was stopped.
-                return begin_page(known) if len(known.rounds) >= shown else 0.0
+                # The second process makes programs during the search, in seconds; later it may be at a stage for minutes.
+                apart = known.remaining is Remaining.SEARCH
+                return begin_page(known, apart) if len(known.rounds) >= shown else 0.0
 
             findings = close_loop(loaded, memory=out / "fits", progress=in_words, command=command, interim=interim)
-        return findings, write(findings)
+        return findings, write_report(findings, out, loaded.path)
 
 
 def _rounds_shown(out: Path) -> int:
