@@ -5,7 +5,7 @@ It is asked of the model that the search ends with, as a rule; of another one th
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -14,6 +14,7 @@ from smajax.attribution.averaged_prediction import Averaged, averaged
 from smajax.attribution.context import Context, Outcome
 from smajax.attribution.held_out import every_run
 from smajax.attribution.model_fits import Model
+from smajax.attribution.nuisance_grid import begin_scores
 from smajax.attribution.outlier_run import LEAVING_OUT, outlier_runs
 from smajax.attribution.record_error import OutlierRun
 from smajax.attribution.unknown.search import Lacking, unknown_terms
@@ -46,21 +47,27 @@ Asks = Callable[[Context, Outcome, Model], _Question]
 
 
 def begin_ahead(context: Context, outcome: Outcome) -> Outcome:
-    """`outcome` with what a second process, where there is one, may have done by the time when it is asked."""
-    setting, base, final = context.setting, outcome.base, outcome.final
-    if outcome.search.wrong_record is not None:
+    """`outcome` with what a second process, where there is one, may have done by the time when it is asked, where the model leaves more than noise."""
+    base, final = outcome.base, outcome.final
+    if outcome.search.wrong_record is not None or context.setting.is_noise(final):
         return outcome
-    questions: list[tuple[Asks, Model]] = []
-    if not setting.is_noise(final):
-        questions += [(_without_runs, base), *([(_without_runs, final)] if final.effects else []), (_with_terms, final)]
-    if len(context.job.fit_runs) > 1:
-        questions.append((_on_average, final))
+    of_final = [(_without_runs, final)] if final.effects else []
+    return _begun(context, outcome, [(_without_runs, base), *of_final, (_with_terms, final)])
 
-    def begun(asks: Asks, model: Model) -> Any:
+
+def begin_findings(context: Context, outcome: Outcome) -> Outcome:
+    """The same of what is asked in the end, whatever the model leaves; once no record is corrected any more."""
+    search, final = outcome.search, outcome.final
+    begin_scores(context.setting, final.effects, context.job.candidates, search.detectable or None, search.traced)
+    return _begun(context, outcome, [(_on_average, final)]) if len(context.job.fit_runs) > 1 else outcome
+
+
+def _begun(context: Context, outcome: Outcome, questions: Sequence[tuple[Asks, Model]]) -> Outcome:
+    asked = list(outcome.asked)
+    for asks, model in questions:
         stage, function, arguments = asks(context, outcome, model)
-        return asks, model, ask_ahead(stage, setting, function, *arguments)
-
-    return replace(outcome, asked=tuple(begun(*one) for one in questions))
+        asked.append((asks, model, ask_ahead(stage, context.setting, function, *arguments)))
+    return replace(outcome, asked=tuple(asked))
 
 
 def _answer(asks: Asks, context: Context, outcome: Outcome, model: Model) -> Any:

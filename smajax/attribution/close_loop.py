@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.assembled_findings import findings_of, known_so_far
-from smajax.attribution.begun_ahead import begin_ahead, outliers_of
+from smajax.attribution.begun_ahead import begin_ahead, begin_findings, outliers_of
 from smajax.attribution.config import AttributionConfig
 from smajax.attribution.context import Context, Interim, Outcome
 from smajax.attribution.declared_priors import of_unknowns
@@ -22,7 +22,7 @@ from smajax.attribution.findings import Findings, Rejected, Remaining
 from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.held_out import compare, validated
 from smajax.attribution.input_of_run import FAR_LESS, begin_record_errors, corrected, record_errors, standing
-from smajax.attribution.job import job_of
+from smajax.attribution.job import Job, job_of
 from smajax.attribution.joint_stage import (
     base_alone,
     search_again,
@@ -96,6 +96,7 @@ def close_loop(  # keywords, which a caller names one by one
     if interim is not None:
         interim(known_so_far(context, base_alone(context.setting, context.base), Remaining.SEARCH))
     context, outcome = with_records_corrected(context)
+    outcome = begin_findings(context, outcome)
     if interim is not None and not context.setting.is_noise(outcome.final):
         interim(known_so_far(context, (outcome.search, outcome.base, outcome.final), Remaining.CHECKS))
     outcome, rejected = against_the_held_out_runs(context, outcome)
@@ -118,26 +119,31 @@ def prepared(  # the stage's inputs, each once
     records: CorrectedRecords = NO_RECORDS,
 ) -> Context:
     """The experiment as a problem, its base model fitted, and what its runs determine, from the Jacobian there."""
-    job = job_of(experiment, integration)
-    start = job.problem.start_values()
-    setting = Search(
-        problem=job.problem,
-        unknowns=job.unknowns,
-        bounds=job.bounds,
-        candidates=job.candidates,
-        cache=cache,
-        progress=progress,
-        noise_given=all(output.noise_given for output in experiment.outputs),
-        noises_given=tuple(output.noise_given for output in experiment.outputs),
-        held_out=job.held_out,
-        held_out_runs=tuple(run.name for run in experiment.runs if run.role != "fit"),
-        config=config,
-        declared=experiment.priors,
-        of_unknowns=of_unknowns(experiment),
-    )
+
+    def setting_of(job: Job) -> Search:
+        return Search(
+            problem=job.problem,
+            unknowns=job.unknowns,
+            bounds=job.bounds,
+            candidates=job.candidates,
+            cache=cache,
+            progress=progress,
+            noise_given=all(output.noise_given for output in experiment.outputs),
+            noises_given=tuple(output.noise_given for output in experiment.outputs),
+            held_out=job.held_out,
+            held_out_runs=tuple(run.name for run in experiment.runs if run.role != "fit"),
+            config=config,
+            declared=experiment.priors,
+            of_unknowns=of_unknowns(experiment),
+        )
+
+    def begin_first_traces(job: Job) -> None:  # what comes after the base fit, for any integration
+        begin_traces(setting_of(job).joint(job.candidates, {}))
+
+    job = job_of(experiment, integration, begin_first_traces)
+    setting, start = setting_of(job), job.problem.start_values()
     if integration is None:
         report_warnings(progress, experiment.warnings)
-    begin_traces(setting.joint(setting.candidates, {}))  # what comes after the base fit
     base = setting.base(start, seed)
     # It was chosen where the fit begins, at which the wire may not even move. Now, and not when the whole search has been made with it.
     if integration is None and (finer := finer_integration(setting, (), base.values)) is not None:

@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from smajax.attribution.asked_ahead import ask_ahead
 from smajax.attribution.explained_share import EXPLAINED, explained_share
 from smajax.attribution.findings import ParameterFinding
 from smajax.attribution.fit_programs import grouped, samples_of
@@ -25,6 +26,7 @@ from smajax.attribution.laplace_evidence import FittedModel, fitted_model, indep
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.record_error import FoundRecordErrors, RecordError
 from smajax.attribution.record_fits import (
+    FITTING,
     LEAST_ODDS,
     MOST_LEFT,
     OF_RECORDS,
@@ -73,8 +75,9 @@ def record_errors(
         return None
     names = [run.name for run in runs]
     carried = _carried(setting, hosts)
-    sought = [one for host, more in zip(hosts, carried, strict=True) if (one := Beside.of(setting, host, names, more))]
-    singly = [one.singly() for one in sought]
+    asked = [ask_ahead(FITTING, setting, _singly, *one, names) for one in zip(hosts[1:], carried[1:], strict=True)]
+    singly = [_singly(setting, hosts[0], carried[0], names)]
+    singly += reversed([one.result() for one in reversed(asked)])  # the last of those that the second process is not at
     fits = [fit for its_fits in singly for fit in its_fits]
     if not fits:
         return None
@@ -92,10 +95,17 @@ def record_errors(
     alone = [fit for fit in compared.on_trial(fits) if needed(fit, compared.error, len(runs))]
     if alone or not trials:
         return found(alone) if trials else None
-    both = [fit for k, one in enumerate(sought) for fit in one.in_two_runs(singly[k], compared.error)]
+    sought = zip((Beside.of(setting, *one, names) for one in zip(hosts, carried, strict=True)), singly, strict=True)
+    both = [fit for one, its_fits in sought if one is not None for fit in one.in_two_runs(its_fits, compared.error)]
     compared = replace(compared, fits=(*fits, *both))
     both = [fit for fit in both if needed(fit, compared.error, len(runs))]
     return found(compared.explaining(both)) or found(compared.on_trial(both))
+
+
+def _singly(setting: Search, host: Host, carried: Sequence[str], runs: Sequence[str]) -> list[Fit]:
+    """`Beside.singly`, where a record can be wrong in any of the ways known."""
+    sought = Beside.of(setting, host, carried, runs)
+    return [] if sought is None else sought.singly()
 
 
 def begin_record_errors(setting: Search, hosts: Sequence[Host], runs: Sequence[Run]) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 from smajax.attribution.run_extent import extent_of
 from smajax.core.parameters import parameter_values, parameters
@@ -17,7 +18,7 @@ from smajax.fit.uncertain_presets import values_not_given
 from smajax.model.effects.library import LIBRARY
 from smajax.model.effects.prior_width import CoefficientPrior
 from smajax.model.extended import extended
-from smajax.simulation.steppers import Integration
+from smajax.simulation.steppers import ONE_STEP, Integration
 
 
 @dataclass(frozen=True)
@@ -34,12 +35,21 @@ class Job:
     presets: dict[str, CoefficientPrior]  # of the values that the experiment does not give
     hidden_by_one_force: tuple[str, ...] = ()  # effects that runs under another load could show
 
+    def integrated(self, integration: Integration) -> Job:
+        """The same with all runs integrated in that way."""
+        held_out = self.held_out and replace(self.held_out, integration=unlimited(integration))
+        return replace(self, problem=with_integration(self.problem, integration), held_out=held_out)
 
-def job_of(experiment: Experiment, integration: Integration | None = None) -> Job:
+
+def job_of(
+    experiment: Experiment,
+    integration: Integration | None = None,
+    meanwhile: Callable[[Job], object] = lambda job: None,
+) -> Job:
     """The fit runs packed, the base model with every candidate at its base value, and the box of each parameter.
 
     A candidate that no fit run can show (a drift over cycles in a log of one, say) is left out here; a box that hangs on the
-    runs, such as the time of a change, is taken from them.
+    runs, such as the time of a change, is taken from them. Without an `integration` one is chosen, which takes a while; `meanwhile` gets the job by one step a sample before that.
     """
     base = base_model(experiment)
     declared = experiment.declared_effects
@@ -58,18 +68,17 @@ def job_of(experiment: Experiment, integration: Integration | None = None) -> Jo
     )
     names = tuple(name for name in under_other_loads if LIBRARY[name].candidate.observable(extent))
     hidden = tuple(name for name in under_other_loads if name not in names)
-    integration = integration or choose_integration(declared_problem, declared_problem.system)
-    problem = with_integration(problem_with((*declared, *names)), integration)
+    problem = problem_with((*declared, *names))
     full = problem.system
     bounds = {entry.name: (entry.low, entry.high) for entry in parameters(full).values()}
     bounds |= {f"{name}.{own}": one for name in names for own, one in LIBRARY[name].candidate.bounds(extent).items()}
     free = free_by_name(experiment, runs)
     bounds |= {name: (unknown.low, unknown.high) for name, unknown in free.items()}
     others = tuple(run for run in experiment.runs if run.role != "fit")
-    held_out = pack(others, experiment.step, parameter_values(full), unlimited(integration)) if others else None
+    held_out = pack(others, experiment.step, parameter_values(full), ONE_STEP) if others else None
     presets, of_presets = values_not_given(experiment, base, bounds)
     bounds |= of_presets
-    return Job(
+    job = Job(
         experiment=experiment,
         fit_runs=runs,
         problem=problem,
@@ -79,7 +88,9 @@ def job_of(experiment: Experiment, integration: Integration | None = None) -> Jo
         candidates=names,
         presets=presets,
         hidden_by_one_force=hidden,
-    )
+    ).integrated(ONE_STEP)
+    meanwhile(job)
+    return job.integrated(integration or choose_integration(declared_problem, declared_problem.system))
 
 
 def effects_excluded(experiment: Experiment) -> int:

@@ -32,7 +32,7 @@ from smajax.attribution.optimum import (
 from smajax.attribution.reasons import LikelierModel, NoLikelierModel, Reason, StepDependent
 from smajax.attribution.same_as_parameters import said_by_parameters
 from smajax.attribution.side_by_side import fitted_from, program_compiled
-from smajax.attribution.step_size_check import gain_kept_at_half_step
+from smajax.attribution.step_size_check import begin_finer_integration, gain_kept_at_half_step
 from smajax.attribution.unknown.search import AskedFor, Asking, asked_for, begin_asking
 from smajax.attribution.unknown.terms import UNKNOWN
 from smajax.fit.levenberg_marquardt import Fit, FitSettings
@@ -71,9 +71,9 @@ class _Stage:
             thorough=bool(presets) or not setting.presets,  # the last search
         )
         search.on_round = partial(self.note, search)
+        search.begin_ahead = partial(self.begin_ahead, search)
         if search.thorough:  # else values of presets are held, which no function is beside
             search.in_place_of_many = partial(self.in_place_of_many, search)
-            search.begin_ahead = partial(self.begin_ahead, search)
             search.before_the_end = partial(self.before_the_end, search)
         search.has_wrong_record = partial(self.has_wrong_record, search)
         return search
@@ -189,12 +189,13 @@ class _Stage:
         return left_without(self.setting, model, program_compiled(search, model.effects))
 
     def begin_ahead(self, search: JointSearch, present: FittedModel) -> None:
-        """What is done at the end of a search is begun by a second process, once it may soon end: unknown functions that are asked for, the program of the model itself."""
-        if search.rounds_before + len(search.rounds) < SOON:
-            return
-        if self.asking is None and not self.asked and self._asks(present):
+        """What a search ends with is begun by a second process: the model's own programs and, once it may soon end, unknown functions that are asked for."""
+        if present.effects:
+            begin_derivatives([search.joint.restricted(present.effects)[0]])  # takes it to its optimum
+            begin_finer_integration(self.setting, present.effects, present.values)
+        soon = search.thorough and search.rounds_before + len(search.rounds) >= SOON
+        if soon and self.asking is None and not self.asked and self._asks(present):
             self.asking = begin_asking(self.setting, search.fitted[()], present.effects)
-        begin_derivatives([search.joint.restricted(present.effects)[0]])  # takes it to its optimum
 
     def _asks(self, found: FittedModel) -> bool:
         """Whether unknown functions are asked for before a search ends with `found`."""

@@ -17,10 +17,12 @@ from smajax.attribution.fit_programs import Effects, compiled_for, samples_of
 from smajax.attribution.model_fits import Model, Search, nudged
 from smajax.attribution.score_test import Score, ranked, samples_per_independent, score_of, switches, without
 from smajax.attribution.traces import by_program, far_from, from_coarse_to_fine
-from smajax.fit.outputs_of_runs import made_ready, misfits, slopes_at
+from smajax.fit.integration import with_integration
+from smajax.fit.outputs_of_runs import begin_derivatives, made_ready, misfits, slopes_at
 from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.model.effects.library import LIBRARY
+from smajax.simulation.steppers import ONE_STEP
 
 
 @dataclass(frozen=True)
@@ -46,9 +48,8 @@ def scanned(
     `effects`, which are off, are each at the place whose trace promises most beside what the fitted parameters absorb. `looked_for`, `compiled`: as of
     `traces_at`.
     """
-    samples = samples_of(setting.problem)
-    programs = by_program(effects, looked_for, samples)
-    restricted = [setting.restricted(compiled_for((*present, *together), compiled, samples)) for together in programs]
+    programs, carried = _carried(setting, effects, present, looked_for, compiled)
+    restricted = [setting.restricted(one) for one in carried]
     own, index = setting.restricted(present)
     misfit = misfits(own, [values[index]])[0] / np.asarray(own.noise)
     slots = [slots for _, slots in restricted]
@@ -73,6 +74,32 @@ def scanned(
             for name, column in columns.items():
                 jacobian[..., at.names.index(name)] = column
     return found
+
+
+def begin_scores(
+    setting: Search,
+    present: Sequence[str],
+    candidates: Sequence[str],
+    looked_for: Sequence[str] | None,
+    compiled: Sequence[Effects],
+) -> None:
+    """Have a second process, where there is one, make the programs of `scores_at` a model with the effects `present`, of the other `candidates`, by one step a sample."""
+    left = [effect for effect in candidates if effect not in present]
+    carried = _carried(setting, left, present, looked_for, compiled)[1] if left else []
+    begin_derivatives([with_integration(setting.restricted(one)[0], ONE_STEP) for one in carried])
+
+
+def _carried(
+    setting: Search,
+    effects: Sequence[str],
+    present: Sequence[str],
+    looked_for: Sequence[str] | None,
+    compiled: Sequence[Effects],
+) -> tuple[list[list[str]], list[Effects]]:
+    """(effects that each program looks at, those that it carries). Arguments as of `scanned`."""
+    samples = samples_of(setting.problem)
+    programs = by_program(effects, looked_for, samples)
+    return programs, [compiled_for((*present, *together), compiled, samples) for together in programs]
 
 
 Places = list[tuple[str, dict[str, float], dict[str, np.ndarray]]]

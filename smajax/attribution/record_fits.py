@@ -44,6 +44,8 @@ MOST_SHARES = (
     (16, 0.1),
 )  # after so many steps a fit ends that leaves more than this share of the squares
 
+FITTING = "inputs of single runs"  # the stage
+
 Host = Model | FittedModel  # a model beside which an error of a record is sought
 
 
@@ -146,7 +148,7 @@ class Beside:
     left: np.ndarray  # (series, N), misfit of the host, SI
 
     @classmethod
-    def of(cls, setting: Search, host: Host, runs: Sequence[str], carried: Sequence[str] = ()) -> Beside | None:
+    def of(cls, setting: Search, host: Host, carried: Sequence[str], runs: Sequence[str]) -> Beside | None:
         """None where no record can be wrong in any of the ways known. `carried`: effects that its program has as well, off."""
         own, slots = setting.restricted((*host.effects, *carried))
         values = host.values[slots]
@@ -232,7 +234,7 @@ class Beside:
             for names, begun in zip(sets, nearest(problem, groups), strict=True)
         ]
         settings = FitSettings(cache=setting.cache, progress=setting.progress)
-        settings = comparison_settings(settings, "inputs of single runs")
+        settings = comparison_settings(settings, FITTING)
         # Of a wrong record there is noise left when it is right; what comes nowhere near that in a few steps is none.
         allowed = (MOST_LEFT * noise / error) ** 2 * count
         excess = tuple((steps, max(share * squares / error**2, allowed)) for steps, share in MOST_SHARES)

@@ -12,7 +12,15 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.model_fits import Model, Search, Start, base_value
-from smajax.fit.integration import LARGEST, MARGIN, IntegrationError, choose_integration, described, integration_error
+from smajax.fit.integration import (
+    LARGEST,
+    MARGIN,
+    IntegrationError,
+    begin_integration_error,
+    choose_integration,
+    described,
+    integration_error,
+)
 from smajax.fit.outputs_of_runs import misfits, predicted_at
 from smajax.fit.packed_runs import RunBatch, halved
 from smajax.fit.problem import Problem
@@ -77,6 +85,12 @@ def integration_error_of(setting: Search, final: Model) -> IntegrationError:
     values = final.values[np.asarray(index)]
     found = integration_error(problem, *_at(problem, values))
     return dataclasses.replace(found, limit=LARGEST * _left(problem, values))
+
+
+def begin_finer_integration(setting: Search, effects: tuple[str, ...], values: np.ndarray) -> None:
+    """Have a second process, where there is one, make the programs with which `finer_integration` looks at a model."""
+    problem, index = setting.restricted(effects)
+    begin_integration_error(problem, _at(problem, values[np.asarray(index)])[0])
 
 
 def finer_integration(

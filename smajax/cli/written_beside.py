@@ -21,8 +21,6 @@ from smajax.core.worker_process import Call, begin_call, is_called, is_there, ta
 SWITCHING = 5e-4
 
 
-
-
 class Begin(Protocol):
     """Begins a page of what is known, and gives the seconds that the page before took. `apart`: by the second process, where there is one."""
 
@@ -41,14 +39,14 @@ def written_beside(write: Callable[..., object], *arguments: Any) -> Iterator[Be
 
     def begin(known: Any, apart: bool = False) -> float:
         took = last.pop().result() if last else 0.0
-        call = _timed, write, known, *arguments
+        call = partial(_timed, write, known, *arguments)
         if apart and is_there():
-            last.append(begin_call(partial(*call), *call))
+            last.append(begin_call(call, _timed, write, known, *arguments))
             return took
         try:
-            last.append(pool.submit(*call))
+            last.append(pool.submit(call))
         except RuntimeError:  # no room for another thread under a cap on memory
-            took = _timed(write, known, *arguments)
+            took = call()
         return took
 
     switching = sys.getswitchinterval()

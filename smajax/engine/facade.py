@@ -246,11 +246,21 @@ def begin_programs(wanted: Sequence[Wanted], first: bool = False) -> None:
     """Have the second process make them, where there is one (`worker_process`); `program` then gives them. `first`: before those that it was to make before."""
     engine = engine_of()
     if engine != "xla" and by_machine_code() and worker_process.is_there():
-        from smajax.engine.native import machine_code
-
         for one in wanted:
             if (key := one.key(engine)) not in _programs:
-                worker_process.begin(key, machine_code, tuple(one), first)
+                worker_process.begin(key, _code_to_send, tuple(one), first)
+
+
+_codes: dict[
+    Hashable, MachineCode
+] = {}  # in the second process, of what it made for the first one: it may be called for the same
+
+
+def _code_to_send(*wanted: Any) -> MachineCode:
+    """The machine code of `Wanted`, for the process that asks for it."""
+    from smajax.engine.native import machine_code
+
+    return cached(_codes, Wanted(*wanted).key(engine_of()), lambda: machine_code(*wanted))
 
 
 def programs(wanted: Sequence[Wanted]) -> None:
@@ -274,7 +284,8 @@ def _made(wanted: Wanted, key: Hashable, engine: Engine, beside: bool) -> Progra
     # What goes wrong in here goes wrong by XLA too.
     with compiling():
         there = worker_process.taken(key)
-        known: MachineCode | Traced = Traced(function, model, names) if there is None else there[0]
+        code = _codes.get(key) if there is None else there[0]
+        known: MachineCode | Traced = Traced(function, model, names) if code is None else code
     if engine == "auto" and WINDOWS:
         _say(UNTRIED)
         return made(None)

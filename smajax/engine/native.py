@@ -36,12 +36,20 @@ class Layout(NamedTuple):
     own: str  # dtype of the numbers that a run has of its own
     tree: Any  # how the results are put together
 
+    def sent(self) -> Layout:
+        """For another process, with an example of the results in the place of their structure: in that of an equinox module an object stands for none, and a copy of it does not."""
+        return self._replace(tree=jax.tree.unflatten(self.tree, range(self.tree.num_leaves)))
+
+    def received(self) -> Layout:
+        """What was `sent`, as it was."""
+        return self._replace(tree=jax.tree.structure(self.tree))
+
 
 class MachineCode(NamedTuple):
     """A compiled program as it goes from one process to another."""
 
     code: bytes
-    layout: Layout
+    layout: Layout  # as `sent`
 
 
 @collector_paused()
@@ -50,7 +58,7 @@ def machine_code(
 ) -> MachineCode:
     """A function of one run, traced, translated and compiled; raises whatever stands in the way. Arguments as of `NativeProgram`."""
     text, layout = _translated(Traced(function, model, names), alone, along)
-    return MachineCode(_code(text, quickly), layout)
+    return MachineCode(_code(text, quickly), layout.sent())
 
 
 def _translated(traced: Traced, alone: bool, along: Along) -> tuple[str, Layout]:
@@ -80,7 +88,7 @@ class NativeProgram:
         Raises Unsupported for what has no translation, and whatever LLVM raises: beside, at the first call.
         """
         if isinstance(made, MachineCode):
-            layout = made.layout
+            layout = made.layout.received()
             self._kernel = _done(_kernel, made.code, layout)
         else:
             text, layout = _translated(made, alone, along)

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.fit.outputs_of_runs import predicted_at
-from smajax.fit.packed_runs import RunBatch, predict_compiled
+from smajax.fit.packed_runs import RunBatch, begin_compiled, predict_compiled
 from smajax.fit.problem import Problem
 from smajax.model.system import System
 from smajax.simulation.integration_error import IntegrationError as IntegrationError
@@ -77,6 +77,13 @@ def integration_error(problem: Problem, system: System, per_run: np.ndarray | No
     chosen = problem.batch.integration
     exact = _exact(problem, system, own)
     return _error(problem, _predicted(problem, system, chosen, own) - exact, chosen)
+
+
+def begin_integration_error(problem: Problem, system: System) -> None:
+    """Have a second process, where there is one, make the programs of `integration_error` of this problem."""
+    for integration in (unlimited(_limited(problem, finest(system))), problem.batch.integration):
+        batch = dataclasses.replace(problem.batch, integration=integration)
+        begin_compiled(system, batch, problem.per_run.names)
 
 
 def _of_tries(integration: Integration, most: np.ndarray) -> Integration:

@@ -18,7 +18,7 @@ from smajax.data.experiment.record import RUN_STARTS, Run
 from smajax.model.sensor_reading import LevelTerm
 from smajax.model.system import System, initial_state, without_levels
 from smajax.model.types import Scalar, State, Trajectory
-from smajax.simulation.compiled import compiled_run
+from smajax.simulation.compiled import begin_compiled_run, compiled_run
 from smajax.simulation.sensors import own_sensor, sensor_output
 from smajax.simulation.simulate import simulate
 from smajax.simulation.steppers import ONE_STEP, Integration
@@ -195,6 +195,15 @@ def _compiled_runs(
         run = compiled_run(here, inputs, batch.dt, batch.integration, initial)
         outputs = batch.outputs if shown else ()
         yield run, [np.asarray(_shown(here, run, name, levels, own, k)) for k, name in enumerate(outputs)]
+
+
+def begin_compiled(system: System, batch: RunBatch, more_names: Sequence[str] = ()) -> None:
+    """Have a second process, where there is one, make the program of `predict_compiled` with these arguments: it is one for all runs."""
+    inputs = {name: jnp.asarray(one[0]) for name, one in batch.inputs.items()}
+    names = (*batch.override_names, *more_names)
+    seen = batch.seen_by(system) is not None
+    here, initial, _ = _started(system, names, [jnp.zeros(())] * len(names), inputs, seen)
+    begin_compiled_run(here, inputs, batch.dt, batch.integration, initial)
 
 
 def simulate_batch(system: System, batch: RunBatch) -> Trajectory:

@@ -4,17 +4,26 @@ from __future__ import annotations
 
 import base64
 import io
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from markupsafe import Markup
 from PIL import Image, ImageSequence
 
+from smajax.core.worker_process import in_two_processes
+
 COLOURS = 64  # of a picture within a page: drawings have few, and take a third of the bytes
 
 
-def small(png: bytes) -> bytes:
+class Small(bytes):
+    """A PNG as a page holds it."""
+
+
+def small(png: bytes) -> Small:
     """The same picture with few colours; as it was where that is smaller."""
+    if isinstance(png, Small):
+        return png
     with Image.open(io.BytesIO(png)) as image:
         full = image.convert("RGB")
     few = full.quantize(COLOURS, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
@@ -24,7 +33,17 @@ def small(png: bytes) -> bytes:
     few.putpalette(palette)
     stream = io.BytesIO()
     few.save(stream, format="png", optimize=True)
-    return min(stream.getvalue(), png, key=len)
+    return Small(min(stream.getvalue(), png, key=len))
+
+
+def drawn_pictures(drawings: Sequence[tuple[Callable[..., bytes | None], tuple[Any, ...]]]) -> list[Small | None]:
+    """What functions of modules draw of their arguments, PNG each, None where they draw nothing; every second one by a second process, where there is one."""
+    return in_two_processes(_drawn, drawings)
+
+
+def _drawn(function: Callable[..., bytes | None], arguments: tuple[Any, ...]) -> Small | None:
+    png = function(*arguments)
+    return None if png is None else small(png)
 
 
 def small_film(gif: bytes) -> bytes:

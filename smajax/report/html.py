@@ -22,10 +22,9 @@ from smajax.attribution.verdict import unknowns_at_bounds
 from smajax.core.display_units import chance, correlation, digits, display, label, p_value, with_error
 from smajax.core.names_of_runs import is_of_run, of_run, parameter_of
 from smajax.core.wording import and_listed, per_cent, verdict_text
-from smajax.core.worker_process import in_two_processes
 from smajax.fit.uncertainty import RemarkKind
 from smajax.report import pictures, run_plots
-from smajax.report.embedded import picture
+from smajax.report.embedded import drawn_pictures, picture
 from smajax.report.formulas import typeset
 from smajax.report.frame import environment, parts_of_frame
 from smajax.report.identifiability_words import remark_text
@@ -231,7 +230,7 @@ def _runs(findings: Findings) -> list[dict[str, Any]]:
     # Drawing takes seconds, in which the search would stand still: what unfinished pages show without it is enough for them.
     drawn = findings.remaining is not Remaining.SEARCH
     asked = [(findings, run, _hysteresis_dpi(number, many)) for number, run in enumerate(findings.runs)]
-    drawings = in_two_processes(pictures.run_hysteresis, asked) if drawn else [None] * len(asked)
+    drawings = drawn_pictures([(pictures.run_hysteresis, one) for one in asked]) if drawn else [None] * len(asked)
     return [
         {
             "run": run,
@@ -329,6 +328,15 @@ def findings_to_html(findings: Findings, narrative: Narrative | None = None, ste
 
     unnamed, finished = zero_so_far(findings), not findings.remaining
     first, correlation_of = run_plots.first_plot(findings), run_plots.residual_correlation(findings)
+    runs = _runs(findings)
+    errors, probabilities, phases, upright = drawn_pictures(
+        [
+            (pictures.errors_by_run, (findings,)),
+            (pictures.effect_probabilities, (findings,)),
+            (pictures.residual_by_phase, (findings,)),
+            (pictures.residual_by_phase, (findings, True)),
+        ]
+    )
     return (
         environment()
         .get_template("findings.html")
@@ -369,7 +377,7 @@ def findings_to_html(findings: Findings, narrative: Narrative | None = None, ste
             evidence_unit=lambda name: _evidence_unit(findings, name),
             evidence_cell=lambda name, value: _evidence_cell(findings, name, value),
             parameters=_parameter_rows(findings),
-            runs=_runs(findings),
+            runs=runs,
             other_outputs=_other_outputs(findings),
             phases=_phase_rows(findings),
             correlations=_correlations(findings),
@@ -377,15 +385,9 @@ def findings_to_html(findings: Findings, narrative: Narrative | None = None, ste
             units=units,
             figures=_figures(findings, output),
             picture_first="" if first is None else series(first, FIRST_POINTS, drawn=finished),
-            picture_errors=picture(pictures.errors_by_run(findings), "Error of each run before and after", "narrow"),
-            picture_candidates=picture(
-                pictures.effect_probabilities(findings), "Candidates by posterior probability", "narrow"
-            ),
-            picture_phases=picture(
-                pictures.residual_by_phase(findings),
-                "Residual by phase of the wire",
-                upright=pictures.residual_by_phase(findings, upright=True),
-            ),
+            picture_errors=picture(errors, "Error of each run before and after", "narrow"),
+            picture_candidates=picture(probabilities, "Candidates by posterior probability", "narrow"),
+            picture_phases=picture(phases, "Residual by phase of the wire", upright=upright),
             picture_correlation="" if correlation_of is None else series(correlation_of, drawn=finished),
         )
     )

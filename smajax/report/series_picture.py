@@ -11,8 +11,7 @@ from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from smajax.core.worker_process import in_two_processes
-from smajax.report.embedded import picture
+from smajax.report.embedded import drawn_pictures, picture
 from smajax.report.pictures import (
     AFTER,
     BEFORE,
@@ -124,5 +123,5 @@ def series_of_runs(plots: Sequence[Sequence[SeriesPlot]], most: int | None = Non
     every = [plot for several in plots for plot in several]
     samples, dpi = samples_of(every) if most is None else most, COARSE if len(every) > MANY else DPI
     asked = [plot for several in plots[:MANY] for plot in several] if drawn else []
-    pictures = iter(in_two_processes(as_picture, [(plot, dpi) for plot in asked]))
+    pictures = iter(drawn_pictures([(as_picture, (plot, dpi)) for plot in asked]))
     return [Markup("").join(_for_page(plot, next(pictures, None), samples) for plot in several) for several in plots]

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.core.parameters import check_bounds
-from smajax.engine import Engine, program
+from smajax.engine import Engine, Wanted, begin_programs, program
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System
 from smajax.model.types import Scalar, Series, State, Trajectory
@@ -165,7 +165,20 @@ def compiled_run(
     return run_alone(_run, _Request(system, series, jnp.asarray(dt, dtype=float), integration, initial), engine)
 
 
+def begin_compiled_run(
+    system: System, inputs: Mapping[str, Series], dt: float, integration: Integration, initial: State | None = None
+) -> None:
+    """Have a second process, where there is one, make the program of `compiled_run` with these arguments."""
+    series = {name: jnp.asarray(values, dtype=float) for name, values in inputs.items()}
+    request = _Request(system, series, jnp.asarray(dt, dtype=float), integration, initial)
+    begin_programs([_alone(_run, request)])
+
+
+def _alone(function: Callable[..., Any], model: eqx.Module) -> Wanted:
+    return Wanted(function, model, ("number",), alone=True)
+
+
 def run_alone(function: Callable[..., Any], model: eqx.Module, engine: Engine) -> Any:
     """What `function(model, _)` gives of one run, arrays of numpy."""
-    run = program(function, model, ("number",), alone=True, engine=engine)
+    run = program(**_alone(function, model)._asdict(), engine=engine)
     return jax.tree.map(lambda leaf: leaf[0], run(model, {"number": np.zeros(1)}, threads=1))

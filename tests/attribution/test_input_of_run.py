@@ -204,7 +204,7 @@ def test_an_error_of_a_kind_that_was_corrected_is_sought_in_the_other_runs(monke
     host = Model((), job.problem.start_values(), 1.0, np.zeros(job.problem.measured.shape), 1.0)
     names = [run.name for run in job.fit_runs]
     monkeypatch.setattr(record_fits, "misfits", lambda *_: [np.ones(job.problem.measured.shape)])  # nothing is fitted
-    beside = Beside.of(setting, host, names)
+    beside = Beside.of(setting, host, (), names)
     assert beside is not None
     late = {name for name in beside.possible if name.startswith("input_delay")}
     assert late == {f"input_delay.delay[{name}]" for name in names if name != "steps"}
