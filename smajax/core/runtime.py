@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 from importlib.metadata import version
 from pathlib import Path
@@ -14,6 +15,8 @@ FLAG = "--xla_cpu_use_fusion_emitters=false"
 WIDE = "--xla_cpu_prefer_vector_width=512"
 KNOWS = {FLAG: ((0, 7), (0, 10)), WIDE: ((0, 7), (0, 12))}
 TRIED = ((0, 7), (0, 12))  # versions of jaxlib that the tests ran with
+# Python's collector of garbage looks after 700 new objects, or 2,000. JAX makes millions that stay: to look at them again and again takes 3 % of an attribution.
+RARELY = (50_000, 20, 20)
 
 
 def kept_programs() -> Path:
@@ -29,6 +32,7 @@ def prepare(cores: bool = False) -> None:
     """
     import jax
 
+    collect_rarely()
     major, minor = (int(part) for part in version("jaxlib").split(".")[:2])
     flags = os.environ.get("XLA_FLAGS", "")
     if cores:
@@ -42,3 +46,8 @@ def prepare(cores: bool = False) -> None:
     # Small ones too: a command has dozens of them.
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
+
+
+def collect_rarely() -> None:
+    """Have Python look for garbage seldom (`RARELY`)."""
+    gc.set_threshold(*RARELY)

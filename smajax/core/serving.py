@@ -13,6 +13,7 @@ from contextlib import suppress
 from typing import IO, Any
 
 from smajax.core import operating_system
+from smajax.core.runtime import collect_rarely
 
 LENGTH = struct.Struct("<Q")
 LOOKED_FOR = 0.5  # s between two looks for the first process
@@ -36,6 +37,7 @@ def serve(imports: Sequence[str], calls: int, answers: int, parent: int) -> None
     """Answer calls from a pipe into another one until there are no more, or the process `parent` has ended."""
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
     operating_system.take_cores(1)  # the first process goes on beside
+    collect_rarely()
     for name in imports:
         with suppress(Exception):
             importlib.import_module(name)

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import os
 import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
 from smajax.cli.written_beside import written_beside
+from smajax.core import worker_process as module
+from smajax.core.worker_process import VARIABLE, begin, worker_process
+from tests.core.test_worker_process import PATIENCE, wait_for
 
 
 def _pages(write: Callable[[str], object], *pages: str) -> None:
@@ -53,3 +58,51 @@ def test_how_long_the_page_before_took_is_said() -> None:
     with written_beside(lambda _: time.sleep(0.05)) as begin:
         assert begin("first") == 0.0
         assert begin("second") >= 0.05
+
+
+def page_of_a_process(known: str, folder: Path) -> None:
+    (folder / known).write_text(str(os.getpid()), encoding="utf-8")
+
+
+def _wait_for_page(page: Path) -> int:
+    deadline = time.monotonic() + PATIENCE
+    while not (page.is_file() and page.read_text(encoding="utf-8")):
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    return int(page.read_text(encoding="utf-8"))
+
+
+@pytest.fixture
+def second(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(VARIABLE)
+    monkeypatch.setattr(module, "available_cores", lambda: 2)
+
+
+def test_a_page_is_written_by_the_second_process_where_that_is_asked_for(second: None, tmp_path: Path) -> None:
+    with worker_process(), written_beside(page_of_a_process, tmp_path) as begin_page:
+        begin_page("first", apart=True)
+        assert _wait_for_page(tmp_path / "first") != os.getpid()
+        assert begin_page("second") > 0.0
+    assert _wait_for_page(tmp_path / "second") == os.getpid()
+    with written_beside(page_of_a_process, tmp_path) as begin_page:  # there is none any more
+        begin_page("third", apart=True)
+    assert _wait_for_page(tmp_path / "third") == os.getpid()
+
+
+def test_a_page_that_the_second_process_has_not_begun_is_written_here_if_no_other_follows(
+    second: None, tmp_path: Path
+) -> None:
+    def interrupted() -> None:
+        with written_beside(page_of_a_process, tmp_path) as begin_page:
+            begin_page("last", apart=True)
+            raise KeyboardInterrupt
+
+    with worker_process():
+        begin("long", time.sleep, (60.0,))
+        wait_for("long")
+        with written_beside(page_of_a_process, tmp_path) as begin_page:
+            begin_page("superseded", apart=True)
+        with pytest.raises(KeyboardInterrupt):
+            interrupted()
+    assert _wait_for_page(tmp_path / "last") == os.getpid()
+    assert not (tmp_path / "superseded").exists()

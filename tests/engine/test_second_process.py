@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from typing import Any
+from unittest import mock
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from smajax.core import worker_process as module
-from smajax.core.worker_process import VARIABLE, worker_process
+from smajax.core.worker_process import VARIABLE, begin_call, worker_process
 from smajax.engine import Wanted, begin_programs, facade, program, programs
 from smajax.engine.traced import Traced
 from tests.core.test_worker_process import wait_for
@@ -20,6 +22,21 @@ X = {"x": np.linspace(0.0, 1.0, 20)}
 def powers(model: Any, own: dict[str, Any]) -> Any:
     x = own["x"]
     return {"square": x**2 * model[0][0], "series": jnp.arange(3) * x}
+
+
+class Doubled(eqx.Module):
+    series: Any
+    kind: str = eqx.field(static=True)
+
+
+def doubled(model: Any, own: dict[str, Any]) -> Any:
+    return Doubled(2.0 * own["x"] * model[0][0], "doubled")
+
+
+def without_tracing() -> Any:
+    """In the second process: what it has made for the first one, it does not make again for itself."""
+    with mock.patch.object(facade, "Traced", None):
+        return program(doubled, (np.asarray([2.0]),), ("x",))((np.asarray([2.0]),), X).series
 
 
 def roots(model: Any, own: dict[str, Any]) -> Any:
@@ -51,6 +68,19 @@ def test_a_program_of_the_second_process_is_taken_and_gives_the_same(second: pyt
     found = made((np.asarray([3.0]),), X)
     np.testing.assert_array_equal(found["square"], 3.0 * X["x"] ** 2)
     np.testing.assert_array_equal(found["series"], np.outer(X["x"], np.arange(3)))
+
+
+def test_a_module_comes_back_whole_and_its_program_is_kept_there(second: pytest.MonkeyPatch) -> None:
+    begin_programs([wanted(doubled)])
+    wait_for(wanted(doubled).key("auto"))
+    call = begin_call(lambda: None, without_tracing)
+    wait_for(call)
+    np.testing.assert_array_equal(call.result(), 4.0 * X["x"])
+    second.setattr(facade, "Traced", None)
+    found = program(doubled, (np.asarray([2.0]),), ("x",))((np.asarray([3.0]),), X)
+    assert isinstance(found, Doubled)
+    assert found.kind == "doubled"
+    np.testing.assert_array_equal(found.series, 6.0 * X["x"])
 
 
 def test_several_programs_are_made_here_and_there(second: pytest.MonkeyPatch) -> None:
