@@ -75,9 +75,11 @@ def record_errors(
         return None
     names = [run.name for run in runs]
     carried = _carried(setting, hosts)
-    asked = [ask_ahead(FITTING, setting, _singly, *one, names) for one in zip(hosts[1:], carried[1:], strict=True)]
-    singly = [_singly(setting, hosts[0], carried[0], names)]
-    singly += reversed([one.result() for one in reversed(asked)])  # the last of those that the second process is not at
+    others = list(zip(hosts[1:], carried[1:], strict=True))
+    asked = [ask_ahead(FITTING, setting, _singly, *one, names) for one in others]
+    first = Beside.of(setting, hosts[0], carried[0], names)
+    # After the first host the last one that the second process is not at.
+    singly = [[] if first is None else first.singly(), *[one.result() for one in reversed(asked)][::-1]]
     fits = [fit for its_fits in singly for fit in its_fits]
     if not fits:
         return None
@@ -89,14 +91,15 @@ def record_errors(
 
     explained = compared.explaining(fits)
     if explained:
-        first = likeliest(explained, compared.error)
-        beside = FoundRecordErrors((), first.host.effects)
-        return found([first]) if needed(first, compared.error, len(runs)) else beside
+        best = likeliest(explained, compared.error)
+        beside = FoundRecordErrors((), best.host.effects)
+        return found([best]) if needed(best, compared.error, len(runs)) else beside
     alone = [fit for fit in compared.on_trial(fits) if needed(fit, compared.error, len(runs))]
     if alone or not trials:
         return found(alone) if trials else None
-    sought = zip((Beside.of(setting, *one, names) for one in zip(hosts, carried, strict=True)), singly, strict=True)
-    both = [fit for one, its_fits in sought if one is not None for fit in one.in_two_runs(its_fits, compared.error)]
+    sought = [first, *(Beside.of(setting, *one, names) for one in others)]
+    pairs = zip(sought, singly, strict=True)
+    both = [fit for one, its_fits in pairs if one is not None for fit in one.in_two_runs(its_fits, compared.error)]
     compared = replace(compared, fits=(*fits, *both))
     both = [fit for fit in both if needed(fit, compared.error, len(runs))]
     return found(compared.explaining(both)) or found(compared.on_trial(both))

@@ -35,6 +35,7 @@ from smajax.attribution.side_by_side import fitted_from, program_compiled
 from smajax.attribution.step_size_check import begin_finer_integration, gain_kept_at_half_step
 from smajax.attribution.unknown.search import AskedFor, Asking, asked_for, begin_asking
 from smajax.attribution.unknown.terms import UNKNOWN
+from smajax.core.worker_process import is_idle
 from smajax.fit.levenberg_marquardt import Fit, FitSettings
 from smajax.fit.outputs_of_runs import begin_derivatives
 from smajax.model.effects.library import LIBRARY
@@ -189,8 +190,8 @@ class _Stage:
         return left_without(self.setting, model, program_compiled(search, model.effects))
 
     def begin_ahead(self, search: JointSearch, present: FittedModel) -> None:
-        """What a search ends with is begun by a second process: the model's own programs and, once it may soon end, unknown functions that are asked for."""
-        if present.effects:
+        """What a search ends with is begun by a second process: the model's own programs, if it has nothing else to do, and, once it may soon end, unknown functions that are asked for."""
+        if present.effects and is_idle():
             begin_derivatives([search.joint.restricted(present.effects)[0]])  # takes it to its optimum
             begin_finer_integration(self.setting, present.effects, present.values)
         soon = search.thorough and search.rounds_before + len(search.rounds) >= SOON

@@ -14,7 +14,7 @@ from functools import partial
 from typing import Any, Protocol
 
 from smajax.cli.terminal import interrupts_answered
-from smajax.core.worker_process import Call, begin_call, is_called, is_there, taken
+from smajax.core.worker_process import Call, begin_call, is_begun, is_called, taken
 
 # Seconds after which Python lets another thread go on, a tenth of its own: the search runs machine code for milliseconds at a time, and would wait
 # for as long after each.
@@ -31,37 +31,40 @@ class Begin(Protocol):
 def written_beside(write: Callable[..., object], *arguments: Any) -> Iterator[Begin]:
     """`write(known, *arguments)`, a function of a module, beside the caller, one page after the other.
 
-    One that was begun is written to its end, also of a search that Ctrl-C ends. What `write` raises is raised by the next call;
-    at the end it is not, since the page of the whole result follows.
+    One that was begun is written to its end, also of a search that Ctrl-C ends; one that the second process has not begun when the next one comes is not written. What
+    `write` raises is raised by the next call; at the end it is not, since the page of the whole result follows.
     """
     pool = ThreadPoolExecutor(1)
     last: list[Future[float] | Call[float]] = []
 
     def begin(known: Any, apart: bool = False) -> float:
-        took = last.pop().result() if last else 0.0
-        call = partial(_timed, write, known, *arguments)
-        if apart and is_there():
-            last.append(begin_call(call, _timed, write, known, *arguments))
-            return took
+        took = _took(last[-1]) if last else 0.0
+        last.clear()
+        page = partial(_timed, write, known, *arguments)
+        if apart:
+            call = begin_call(page, _timed, write, known, *arguments, first=True)
+            if is_begun(call):
+                last.append(call)
+                return took
         try:
-            last.append(pool.submit(call))
+            last.append(pool.submit(page))
         except RuntimeError:  # no room for another thread under a cap on memory
-            took = call()
+            took = page()
         return took
 
     switching = sys.getswitchinterval()
     sys.setswitchinterval(SWITCHING)
-    ended = False
+    whole_follows = False
     try:
         yield begin
-        ended = True
+        whole_follows = True
     finally:
         sys.setswitchinterval(switching)
         with interrupts_answered():
             pool.shutdown()
-            for one in last:
-                if isinstance(one, Call):
-                    _end(one, ended)
+            for page in last:
+                with suppress(Exception):
+                    _took(page) if whole_follows else page.result()
 
 
 def _timed(write: Callable[..., object], *arguments: Any) -> float:
@@ -70,10 +73,9 @@ def _timed(write: Callable[..., object], *arguments: Any) -> float:
     return time.monotonic() - began
 
 
-def _end(page: Call[float], whole_follows: bool) -> None:
-    """Wait for the second process, which may be at the page; one that it has not begun is written here, unless that of the whole result follows."""
-    if whole_follows and not is_called(page):
-        taken(page)  # which is to have it begun no more
-        return
-    with suppress(Exception):
-        page.result()
+def _took(page: Future[float] | Call[float]) -> float:
+    """Seconds that a page took, once it is written; one that the second process has not begun is not any more."""
+    if isinstance(page, Call) and not is_called(page):
+        taken(page)
+        return 0.0
+    return page.result()

@@ -32,7 +32,6 @@ def prepare(cores: bool = False) -> None:
     """
     import jax
 
-    collect_rarely()
     major, minor = (int(part) for part in version("jaxlib").split(".")[:2])
     flags = os.environ.get("XLA_FLAGS", "")
     if cores:
@@ -49,5 +48,5 @@ def prepare(cores: bool = False) -> None:
 
 
 def collect_rarely() -> None:
-    """Have Python look for garbage seldom (`RARELY`)."""
+    """Have Python look for garbage seldom (`RARELY`); of a process of ours alone."""
     gc.set_threshold(*RARELY)

@@ -16,7 +16,7 @@ from smajax.core import operating_system
 from smajax.core.runtime import collect_rarely
 
 LENGTH = struct.Struct("<Q")
-LOOKED_FOR = 0.5  # s between two looks for the first process
+LOOKED_FOR = 0.05  # s between two looks for the first process, in whose folder a call may write
 
 
 def written(content: bytes) -> bytes:

@@ -99,6 +99,14 @@ class Worker:
         """Whether a function has been called, and may have returned."""
         return key in self._called
 
+    def is_begun(self, key: Hashable) -> bool:
+        """Whether a function is called, or waits for it."""
+        return key in self._called or key in self._waiting
+
+    def is_idle(self) -> bool:
+        """Whether nothing is called and nothing waits."""
+        return not self._ended and not self._waiting and all(one.done() for one in tuple(self._called.values()))
+
     def taken(self, key: Hashable) -> tuple[Any] | None:
         """(what a function returned,), for which this waits where it was called; None where it was not, or failed. It is then forgotten."""
         with self._changed:
@@ -168,6 +176,16 @@ def is_called(key: Hashable) -> bool:
     return _worker is not None and _worker.is_called(key)
 
 
+def is_begun(key: Hashable) -> bool:
+    """Whether the second process calls it, or will, if nothing happens to it."""
+    return _worker is not None and _worker.is_begun(key)
+
+
+def is_idle() -> bool:
+    """Whether there is a second process, and it has nothing to do."""
+    return _worker is not None and _worker.is_idle()
+
+
 def taken(key: Hashable) -> tuple[Any] | None:
     """(what the second process has returned, or soon will,) under this key; None: the caller is to call the function."""
     return None if _worker is None else _worker.taken(key)
@@ -185,10 +203,12 @@ class Call(Generic[Result]):
         return self.here() if found is None else found[0]
 
 
-def begin_call(here: Callable[[], Result], function: Callable[..., Result], *arguments: Any) -> Call[Result]:
-    """Have a function called by the second process, where there is one; `here` is the same call by this one, with what shows its progress."""
+def begin_call(
+    here: Callable[[], Result], function: Callable[..., Result], *arguments: Any, first: bool = False
+) -> Call[Result]:
+    """Have a function called by the second process, where there is one; `here` is the same call by this one, with what shows its progress. `first`: before those that wait."""
     result = Call(here)
-    begin(result, function, arguments)
+    begin(result, function, arguments, first)
     return result
 
 

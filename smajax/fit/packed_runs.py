@@ -199,7 +199,7 @@ def _compiled_runs(
 
 def begin_compiled(system: System, batch: RunBatch, more_names: Sequence[str] = ()) -> None:
     """Have a second process, where there is one, make the program of `predict_compiled` with these arguments: it is one for all runs."""
-    inputs = {name: jnp.asarray(one[0]) for name, one in batch.inputs.items()}
+    inputs = {name: jnp.asarray(np.asarray(one)[0]) for name, one in batch.inputs.items()}
     names = (*batch.override_names, *more_names)
     seen = batch.seen_by(system) is not None
     here, initial, _ = _started(system, names, [jnp.zeros(())] * len(names), inputs, seen)

@@ -170,6 +170,8 @@ def begin_compiled_run(
 ) -> None:
     """Have a second process, where there is one, make the program of `compiled_run` with these arguments."""
     series = {name: jnp.asarray(values, dtype=float) for name, values in inputs.items()}
+    if len(next(iter(series.values()))) == 1:
+        return
     request = _Request(system, series, jnp.asarray(dt, dtype=float), integration, initial)
     begin_programs([_alone(_run, request)])
 

@@ -18,6 +18,7 @@ from smajax.core.worker_process import OF_ATTRIBUTION, VARIABLE, Call, worker_pr
 from smajax.data.experiment.load import load_experiment
 from smajax.data.experiment.record import Experiment
 from smajax.data.model_catalogue import CATALOGUE
+from smajax.engine import facade
 from smajax.report.json_file import findings_to_json
 
 OWN = {"provenance"}  # seconds
@@ -85,8 +86,20 @@ def test_what_is_said_is_the_same_and_every_call_was_made_there(monkeypatch: pyt
         return found
 
     monkeypatch.setattr(module.Worker, "taken", answered)
+    begun: set[Any] = set()
+    begin = module.Worker.begin
+
+    def noted_key(worker: module.Worker, key: Any, *rest: Any) -> None:
+        begun.add(key)
+        begin(worker, key, *rest)
+
+    monkeypatch.setattr(module.Worker, "begin", noted_key)
+    monkeypatch.setattr(facade, "_programs", {})
     with worker_process(OF_ATTRIBUTION):
         _same(_said(experiment), alone)
+    programs = {key for key in begun if not isinstance(key, Call)}
+    assert programs
+    assert programs <= facade._programs.keys()  # all that it was asked to make
     assert there[True] > 0
     assert not there[False]
     assert taken

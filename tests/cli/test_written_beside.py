@@ -102,7 +102,30 @@ def test_a_page_that_the_second_process_has_not_begun_is_written_here_if_no_othe
         wait_for("long")
         with written_beside(page_of_a_process, tmp_path) as begin_page:
             begin_page("superseded", apart=True)
+            assert begin_page("second") == 0.0
+            assert _wait_for_page(tmp_path / "second") == os.getpid()
+            begin_page("superseded", apart=True)
         with pytest.raises(KeyboardInterrupt):
             interrupted()
     assert _wait_for_page(tmp_path / "last") == os.getpid()
     assert not (tmp_path / "superseded").exists()
+
+
+def test_a_page_is_written_by_a_thread_where_the_second_process_has_ended_or_cannot_have_it(
+    second: None, tmp_path: Path
+) -> None:
+    def local(known: str, folder: Path) -> None:
+        page_of_a_process(known, folder)
+
+    with worker_process():
+        with written_beside(local, tmp_path) as begin_page:
+            begin_page("local", apart=True)
+            assert _wait_for_page(tmp_path / "local") == os.getpid()
+        begin("long", time.sleep, (60.0,))
+        wait_for("long")
+        assert module._worker is not None
+        module._worker._process.kill()
+        assert module.taken("long") is None
+        with written_beside(page_of_a_process, tmp_path) as begin_page:
+            begin_page("ended", apart=True)
+            assert _wait_for_page(tmp_path / "ended") == os.getpid()

@@ -73,6 +73,23 @@ def test_what_was_not_called_yet_is_called_here_and_not_there(started: module.Wo
     assert taken("next") == (started._process.pid,)
 
 
+def test_whether_it_has_anything_to_do_is_said(started: module.Worker) -> None:
+    begin("ready", os.getpid, ())
+    wait_for("ready")
+    assert module.is_begun("ready")
+    assert taken("ready") is not None
+    assert module.is_idle()
+    begin("long", time.sleep, (60.0,))
+    wait_for("long")
+    begin("waits", os.getpid, ())
+    assert not module.is_idle()
+    assert module.is_begun("waits")
+    started._process.kill()
+    assert taken("long") is None
+    assert not module.is_idle()
+    assert not module.is_begun("waits")
+
+
 def test_a_function_that_fails_there_is_called_here(started: module.Worker) -> None:
     call = begin_call(here_only, partial(int, "none"))
     wait_for(call)

@@ -30,9 +30,10 @@ OWN = ("report.html", "report.json", "parameters.csv", "runs.csv", *MODELS, *CON
 def load(experiment: Path) -> Experiment:
     """The experiment with its runs. Raises ExperimentError."""
     # Imported here so that `--help` does not wait for JAX; x64 is the caller's choice, and this is the caller.
-    from smajax.core.runtime import prepare
+    from smajax.core.runtime import collect_rarely, prepare
 
     prepare()
+    collect_rarely()
     from smajax.data.open_experiment import open_experiment
 
     return open_experiment(experiment)
