@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from smajax.control.position_unit import DEGREES
 from smajax.report.sweep_numbers import MAPPED, SHOWN, map_numbers
+from smajax.report.sweep_page import perturbed_sentence
 from smajax.report.sweep_pictures import common_limits, draw_comparison, draw_maps
 
 RATIOS = np.geomspace(0.5, 2.0, 5)
@@ -45,6 +46,16 @@ def test_the_worst_case_is_of_the_set_points_in_reach_beside_their_median() -> N
     assert numbers["overshoot"]["worst"][1][0] == pytest.approx(8.0 * degree, rel=1e-3)
     assert numbers["overshoot"]["worst"][0][0] == pytest.approx(1.0 * degree, rel=1e-3)
     assert (numbers["settling_time"]["worst"][0][1], numbers["settling_time"]["median"][4][4]) == (None, None)
+
+
+def test_it_is_said_within_what_time_half_of_the_loops_settle_and_most() -> None:
+    sweep = a_sweep(1.0)
+    sweep.distance_at = lambda at, least: None
+    grid: Any = SimpleNamespace(**{**vars(GRID), "mismatches": ("inertia", "ambient")})
+    # 47 of 50: two each at 1 to 24 s, but for one at 2 s.
+    assert "(half of these within 13 s, nine tenths within 22 s)" in perturbed_sentence(grid, sweep)
+    sweep.merits.settling_time[:] = np.inf
+    assert "half of these" not in perturbed_sentence(grid, sweep)
 
 
 def test_the_legend_of_the_least_time_covers_no_line() -> None:
