@@ -23,7 +23,7 @@ from smajax.attribution.fitted_sets import JointRound, JointSearch
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model
 from smajax.attribution.program_fits import BegunFit
 from smajax.attribution.round_cache import Asked, key_of_round, loaded_round, save_round
-from smajax.attribution.set_starts import at_usual_size, starts
+from smajax.attribution.set_starts import as_fitted_before, at_usual_size, starts
 from smajax.attribution.side_by_side import LOOSELY, fit_continued, fit_side_by_side, grouped_sets
 from smajax.attribution.subset_evidence import LinearModel, Subset, linear_model
 from smajax.attribution.traces import Traces, Variant, begin_traces, traces_at
@@ -388,4 +388,6 @@ def _begun(
                 # And, where an effect is new, from its usual size: near zero the misfit may have a minimum of its own.
                 usual = at_usual_size(joint, subset, traces, start)
                 begun += [BegunFit(effects, one, linear.width_factors) for one in usual]
+                before = as_fitted_before(joint, subset, traces, search.fitted.values(), error)
+                begun += [BegunFit(effects, one, linear.width_factors) for one in before]
     return begun

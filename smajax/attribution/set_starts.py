@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from smajax.attribution.exclusive_effects import replaceable
+from smajax.attribution.exclusive_effects import exclude_each_other, replaceable
 from smajax.attribution.joint_parameters import JointParameters
+from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.subset_evidence import LinearModel, Subset
 from smajax.attribution.traces import Traces, Variant
 from smajax.fit.starts import logarithmic_points
@@ -64,6 +65,29 @@ def at_usual_size(joint: JointParameters, subset: Subset, traces: Traces, start:
             if (guess - base) * (changed[k] - base) < 0.0 and high - base > base - low:
                 usual[k], other_side = min(guess, 0.5 * (base + high)), True
     return [changed, usual] if other_side else [changed]
+
+
+def as_fitted_before(
+    joint: JointParameters, subset: Subset, traces: Traces, fitted: Iterable[FittedModel], error: float
+) -> list[np.ndarray]:
+    """Where a set with a new effect in the place of one that it excludes begins as well, (P,): at the likeliest of the `fitted` models with the new one and some of the set, and the others of the set as they are.
+
+    With another shape of the transformation its temperatures are others, far from those of the present fit. `error` of an independent sample, SI.
+    """
+    effects = {variant.effect for variant in subset}
+    gone, models, points = set(traces.present) - effects, list(fitted), []
+    for new in joint.ordered(tuple(effects - set(traces.present))):
+        if not any(exclude_each_other((new, one)) for one in gone):
+            continue
+        known = [one for one in models if new in one.effects and effects.issuperset(one.effects)]
+        best = max(known, key=lambda one: one.log_evidence(error**2), default=None)
+        if best is None:
+            continue
+        values = np.array(best.values)
+        others = [joint.slots[name] for effect in effects - set(best.effects) for name in joint.coefficients[effect]]
+        values[others] = traces.values[others]
+        points.append(values)
+    return points
 
 
 def _begin(
