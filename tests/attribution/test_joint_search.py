@@ -17,7 +17,7 @@ from smajax.attribution.laplace_evidence import FittedModel, fitted_model
 from smajax.attribution.leave_one_run_out import left_out
 from smajax.attribution.optimum import refined, with_no_effect_too_many
 from smajax.attribution.program_fits import models_by_program
-from smajax.attribution.set_starts import PLACES, as_fitted_before, starts
+from smajax.attribution.set_starts import PLACES, starts
 from smajax.attribution.subset_evidence import linear_model
 from smajax.attribution.traces import Variant, traces_at
 from smajax.core.parameters import parameter_values, parameters
@@ -334,28 +334,6 @@ def test_a_friction_in_the_place_of_another_begins_where_that_one_was() -> None:
     # Beside the other it replaces none.
     both = frozenset({coulomb, Variant(frictions[1], -1)})
     assert all(point[slots["coulomb_friction.bend"]] != 3e-6 for point in starts(joint, both, linear, traces))
-
-
-def test_a_shape_in_the_place_of_another_begins_as_it_was_fitted_before_too() -> None:
-    """The temperatures of a wire with the one are not those with the other."""
-    old, new, beside = "smooth_transformation", "two_part_transformation", "radiation"
-    search = hot_weight({}, (old, new, beside))
-    joint, slots = search.joint, search.joint.slots
-    here, there = joint.problem.start_values(), joint.problem.start_values()
-    here[slots[f"{old}.weight"]], here[slots[f"{beside}.emissivity"]] = 1.0, 0.4
-    there[slots[UNKNOWNS[0]]] *= 1.1
-    there[slots[f"{new}.heating_weight"]] = 0.6
-    present = fitted_model(joint, (old, beside), here, (old, new, beside))
-    alone = fitted_model(joint, (new,), there, (old, new, beside))
-    traces = traces_at(joint, present, search.extent)
-    subset = frozenset({Variant(new, -1), Variant(beside, -1)})
-    (point,) = as_fitted_before(joint, subset, traces, [present, alone], NOISE)
-    assert point[slots[f"{beside}.emissivity"]] == 0.4
-    point[slots[f"{beside}.emissivity"]] = there[slots[f"{beside}.emissivity"]]
-    np.testing.assert_array_equal(point, there)
-    assert not as_fitted_before(joint, subset, traces, [present], NOISE)  # it was not fitted before
-    with_both = frozenset({Variant(old, -1), Variant(new, -1), Variant(beside, -1)})
-    assert not as_fitted_before(joint, with_both, traces, [present, alone], NOISE)  # it replaces none
 
 
 def test_starts_of_a_backlash_lie_beyond_its_linear_estimate() -> None:
