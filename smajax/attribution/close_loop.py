@@ -22,7 +22,7 @@ from smajax.attribution.findings import Findings, Rejected, Remaining
 from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.held_out import compare, validated
 from smajax.attribution.input_of_run import FAR_LESS, begin_record_errors, corrected, record_errors, standing
-from smajax.attribution.job import Job, job_of
+from smajax.attribution.job import job_by_one_step
 from smajax.attribution.joint_stage import (
     base_alone,
     search_again,
@@ -119,29 +119,25 @@ def prepared(  # the stage's inputs, each once
     records: CorrectedRecords = NO_RECORDS,
 ) -> Context:
     """The experiment as a problem, its base model fitted, and what its runs determine, from the Jacobian there."""
-
-    def setting_of(job: Job) -> Search:
-        return Search(
-            problem=job.problem,
-            unknowns=job.unknowns,
-            bounds=job.bounds,
-            candidates=job.candidates,
-            cache=cache,
-            progress=progress,
-            noise_given=all(output.noise_given for output in experiment.outputs),
-            noises_given=tuple(output.noise_given for output in experiment.outputs),
-            held_out=job.held_out,
-            held_out_runs=tuple(run.name for run in experiment.runs if run.role != "fit"),
-            config=config,
-            declared=experiment.priors,
-            of_unknowns=of_unknowns(experiment),
-        )
-
-    def begin_first_traces(job: Job) -> None:  # what comes after the base fit, for any integration
-        begin_traces(setting_of(job).joint(job.candidates, {}))
-
-    job = job_of(experiment, integration, begin_first_traces)
-    setting, start = setting_of(job), job.problem.start_values()
+    job = job_by_one_step(experiment)
+    start = job.problem.start_values()
+    setting = Search(
+        problem=job.problem,
+        unknowns=job.unknowns,
+        bounds=job.bounds,
+        candidates=job.candidates,
+        cache=cache,
+        progress=progress,
+        noise_given=all(output.noise_given for output in experiment.outputs),
+        noises_given=tuple(output.noise_given for output in experiment.outputs),
+        held_out_runs=tuple(run.name for run in experiment.runs if run.role != "fit"),
+        config=config,
+        declared=experiment.priors,
+        of_unknowns=of_unknowns(experiment),
+    )
+    begin_traces(setting.joint(setting.candidates, {}))  # what comes after the base fit, for any integration
+    job = job.integrated(integration)
+    setting.problem, setting.held_out = job.problem, job.held_out
     if integration is None:
         report_warnings(progress, experiment.warnings)
     base = setting.base(start, seed)

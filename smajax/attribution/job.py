@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from smajax.attribution.run_extent import extent_of
@@ -18,7 +17,7 @@ from smajax.fit.uncertain_presets import values_not_given
 from smajax.model.effects.library import LIBRARY
 from smajax.model.effects.prior_width import CoefficientPrior
 from smajax.model.extended import extended
-from smajax.simulation.steppers import ONE_STEP, Integration
+from smajax.simulation.steppers import Integration
 
 
 @dataclass(frozen=True)
@@ -33,23 +32,26 @@ class Job:
     bounds: dict[str, tuple[float, float]]
     candidates: tuple[str, ...]
     presets: dict[str, CoefficientPrior]  # of the values that the experiment does not give
+    declared: Problem  # the same runs with the effects that the experiment declares alone
     hidden_by_one_force: tuple[str, ...] = ()  # effects that runs under another load could show
 
-    def integrated(self, integration: Integration) -> Job:
-        """The same with all runs integrated in that way."""
+    def integrated(self, given: Integration | None = None) -> Job:
+        """The same with all runs integrated as `given`, or as is chosen, which takes a while."""
+        integration = given or choose_integration(self.declared, self.declared.system)
         held_out = self.held_out and replace(self.held_out, integration=unlimited(integration))
         return replace(self, problem=with_integration(self.problem, integration), held_out=held_out)
 
 
-def job_of(
-    experiment: Experiment,
-    integration: Integration | None = None,
-    meanwhile: Callable[[Job], object] = lambda job: None,
-) -> Job:
-    """The fit runs packed, the base model with every candidate at its base value, and the box of each parameter.
+def job_of(experiment: Experiment, integration: Integration | None = None) -> Job:
+    """`job_by_one_step`, integrated as `integration` says, or as is chosen."""
+    return job_by_one_step(experiment).integrated(integration)
+
+
+def job_by_one_step(experiment: Experiment) -> Job:
+    """The fit runs packed, the base model with every candidate at its base value, and the box of each parameter; by one step a sample, before an integration is chosen.
 
     A candidate that no fit run can show (a drift over cycles in a log of one, say) is left out here; a box that hangs on the
-    runs, such as the time of a change, is taken from them. Without an `integration` one is chosen, which takes a while; `meanwhile` gets the job by one step a sample before that.
+    runs, such as the time of a change, is taken from them.
     """
     base = base_model(experiment)
     declared = experiment.declared_effects
@@ -75,10 +77,10 @@ def job_of(
     free = free_by_name(experiment, runs)
     bounds |= {name: (unknown.low, unknown.high) for name, unknown in free.items()}
     others = tuple(run for run in experiment.runs if run.role != "fit")
-    held_out = pack(others, experiment.step, parameter_values(full), ONE_STEP) if others else None
+    held_out = pack(others, experiment.step, parameter_values(full)) if others else None
     presets, of_presets = values_not_given(experiment, base, bounds)
     bounds |= of_presets
-    job = Job(
+    return Job(
         experiment=experiment,
         fit_runs=runs,
         problem=problem,
@@ -87,10 +89,9 @@ def job_of(
         bounds=bounds,
         candidates=names,
         presets=presets,
+        declared=declared_problem,
         hidden_by_one_force=hidden,
-    ).integrated(ONE_STEP)
-    meanwhile(job)
-    return job.integrated(integration or choose_integration(declared_problem, declared_problem.system))
+    )
 
 
 def effects_excluded(experiment: Experiment) -> int:

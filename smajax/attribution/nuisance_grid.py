@@ -16,13 +16,11 @@ import numpy as np
 from smajax.attribution.fit_programs import Effects, compiled_for, samples_of
 from smajax.attribution.model_fits import Model, Search, nudged
 from smajax.attribution.score_test import Score, ranked, samples_per_independent, score_of, switches, without
-from smajax.attribution.traces import by_program, far_from, from_coarse_to_fine
-from smajax.fit.integration import with_integration
+from smajax.attribution.traces import by_one_step, by_program, far_from, from_coarse_to_fine
 from smajax.fit.outputs_of_runs import begin_derivatives, made_ready, misfits, slopes_at
 from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.model.effects.library import LIBRARY
-from smajax.simulation.steppers import ONE_STEP
 
 
 @dataclass(frozen=True)
@@ -86,7 +84,7 @@ def begin_scores(
     """Have a second process, where there is one, make the programs of `scores_at` a model with the effects `present`, of the other `candidates`, by one step a sample."""
     left = [effect for effect in candidates if effect not in present]
     carried = _carried(setting, left, present, looked_for, compiled)[1] if left else []
-    begin_derivatives([with_integration(setting.restricted(one)[0], ONE_STEP) for one in carried])
+    begin_derivatives(by_one_step([setting.restricted(one)[0] for one in carried]))
 
 
 def _carried(

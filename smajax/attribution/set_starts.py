@@ -74,11 +74,9 @@ def as_fitted_before(
 
     With another shape of the transformation its temperatures are others, far from those of the present fit. `error` of an independent sample, SI.
     """
-    effects = {variant.effect for variant in subset}
-    gone, models, points = set(traces.present) - effects, list(fitted), []
-    for new in joint.ordered(tuple(effects - set(traces.present))):
-        if not any(exclude_each_other((new, one)) for one in gone):
-            continue
+    effects, models, points = {variant.effect for variant in subset}, list(fitted), []
+    pairs = _replacements(joint, subset, traces)
+    for new in dict.fromkeys(new for new, gone in pairs if exclude_each_other((new, gone))):
         known = [one for one in models if new in one.effects and effects.issuperset(one.effects)]
         best = max(known, key=lambda one: one.log_evidence(error**2), default=None)
         if best is None:
@@ -115,19 +113,24 @@ def _in_the_place_of(joint: JointParameters, subset: Subset, traces: Traces, val
 
     A limit of friction was found with the stick and slip of its runs, which a start elsewhere need not come to.
     """
-    effects = {variant.effect for variant in subset}
-    pairs = [
-        (new, gone)
-        for new in joint.ordered(tuple(effects - set(traces.present)))
-        for gone in joint.ordered(tuple(set(traces.present) - effects))
-        if replaceable(new, gone)
-    ]
+    pairs = _replacements(joint, subset, traces)
     changed = np.array(values)
     for new, gone in pairs:
         for name in joint.coefficients[new]:
             if (there := f"{gone}.{name.split('.', 1)[1]}") in joint.coefficients[gone]:
                 changed[joint.slots[name]] = np.clip(traces.values[joint.slots[there]], *joint.bounds[name])
     return changed if pairs else None
+
+
+def _replacements(joint: JointParameters, subset: Subset, traces: Traces) -> list[tuple[str, str]]:
+    """(new effect of the set, present one that is not in it) where the one may stand in the place of the other."""
+    effects = {variant.effect for variant in subset}
+    return [
+        (new, gone)
+        for new in joint.ordered(tuple(effects - set(traces.present)))
+        for gone in joint.ordered(tuple(set(traces.present) - effects))
+        if replaceable(new, gone)
+    ]
 
 
 def _elsewhere(joint: JointParameters, effect: str, values: np.ndarray) -> list[np.ndarray]:

@@ -87,7 +87,7 @@ def begin_traces(
 ) -> None:
     """Have a second process, where there is one, make the programs of `traces_at` a model that has the effects `present`, by one step a sample."""
     carried = _carried(joint, present, candidates, None, compiled)[2]
-    begin_derivatives([with_integration(joint.restricted(one)[0], ONE_STEP) for one in carried])
+    begin_derivatives(by_one_step([joint.restricted(one)[0] for one in carried]))
 
 
 def _carried(
@@ -107,9 +107,14 @@ def _carried(
     return among, programs, [compiled_for(joint.ordered((*present, *one)), known, samples) for one in programs]
 
 
+def by_one_step(problems: Sequence[Problem]) -> list[Problem]:
+    """The same with one step a sample."""
+    return [with_integration(problem, ONE_STEP) for problem in problems]
+
+
 def from_coarse_to_fine(problems: Sequence[Problem]) -> Iterator[list[Problem]]:
     """By one step a sample, and by their own integration."""
-    yield [with_integration(problem, ONE_STEP) for problem in problems]
+    yield by_one_step(problems)
     yield list(problems)
 
 

@@ -251,9 +251,8 @@ def begin_programs(wanted: Sequence[Wanted], first: bool = False) -> None:
                 worker_process.begin(key, _code_to_send, tuple(one), first)
 
 
-_codes: dict[
-    Hashable, MachineCode
-] = {}  # in the second process, of what it made for the first one: it may be called for the same
+# In the second process, what it made for the first one: it may be called for the same.
+_codes: dict[Hashable, MachineCode] = {}
 
 
 def _code_to_send(*wanted: Any) -> MachineCode:

@@ -34,22 +34,16 @@ class Layout(NamedTuple):
     several: tuple[bool, ...]  # which results are one for each direction
     shared: tuple[str, ...]  # dtypes of the model's arrays
     own: str  # dtype of the numbers that a run has of its own
-    tree: Any  # how the results are put together
-
-    def sent(self) -> Layout:
-        """For another process, with an example of the results in the place of their structure: in that of an equinox module an object stands for none, and a copy of it does not."""
-        return self._replace(tree=jax.tree.unflatten(self.tree, range(self.tree.num_leaves)))
-
-    def received(self) -> Layout:
-        """What was `sent`, as it was."""
-        return self._replace(tree=jax.tree.structure(self.tree))
+    # The results put together, a number in the place of each: their structure does not go from process to process, since in that of an equinox
+    # module an object stands for none, and a copy of it does not.
+    example: Any
 
 
 class MachineCode(NamedTuple):
     """A compiled program as it goes from one process to another."""
 
     code: bytes
-    layout: Layout  # as `sent`
+    layout: Layout
 
 
 @collector_paused()
@@ -58,7 +52,7 @@ def machine_code(
 ) -> MachineCode:
     """A function of one run, traced, translated and compiled; raises whatever stands in the way. Arguments as of `NativeProgram`."""
     text, layout = _translated(Traced(function, model, names), alone, along)
-    return MachineCode(_code(text, quickly), layout.sent())
+    return MachineCode(_code(text, quickly), layout)
 
 
 def _translated(traced: Traced, alone: bool, along: Along) -> tuple[str, Layout]:
@@ -74,7 +68,8 @@ def _translated(traced: Traced, alone: bool, along: Along) -> tuple[str, Layout]
     )
     shared = tuple(kinds[: traced.shared])
     sizes = found.lanes, found.vectors, found.scratch
-    return found.text, Layout(*sizes, found.results, found.several, shared, str(traced.number), traced.tree)
+    example = jax.tree.unflatten(traced.tree, range(traced.tree.num_leaves))
+    return found.text, Layout(*sizes, found.results, found.several, shared, str(traced.number), example)
 
 
 class NativeProgram:
@@ -88,14 +83,14 @@ class NativeProgram:
         Raises Unsupported for what has no translation, and whatever LLVM raises: beside, at the first call.
         """
         if isinstance(made, MachineCode):
-            layout = made.layout.received()
+            layout = made.layout
             self._kernel = _done(_kernel, made.code, layout)
         else:
             text, layout = _translated(made, alone, along)
             make = _begun if beside else _done
             self._kernel = make(_compiled_kernel, text, layout, quickly)
         self.scratch = layout.scratch  # memory that a thread works in, bytes
-        self._names, self._along, self._layout = names, along, layout
+        self._names, self._along, self._layout, self._tree = names, along, layout, jax.tree.structure(layout.example)
         self._shared = [np.dtype(kind) for kind in layout.shared]
 
     def wait(self) -> None:
@@ -120,8 +115,8 @@ class NativeProgram:
         back = np.argsort(order)
         found = self._kernel.result()(shared, values, threads, stop)
         if not self._along.names:
-            return jax.tree.unflatten(self._layout.tree, [one[back] for one in found])
-        return jax.tree.unflatten(self._layout.tree, self._by_direction(found, back))
+            return jax.tree.unflatten(self._tree, [one[back] for one in found])
+        return jax.tree.unflatten(self._tree, self._by_direction(found, back))
 
     def _by_direction(self, found: list[np.ndarray], back: np.ndarray) -> list[np.ndarray]:
         """Leaves of shape (runs, directions, ...) of what the program gives, which is emptied on the way.

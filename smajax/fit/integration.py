@@ -46,7 +46,12 @@ def _predicted(problem: Problem, system: System, integration: Integration, per_r
 
 def _exact(problem: Problem, system: System, per_run: np.ndarray) -> np.ndarray:
     """What integrations are measured against, by the program of a fit."""
-    return _predicted(problem, system, unlimited(_limited(problem, finest(system))), per_run)
+    return _predicted(problem, system, _finest(problem, system), per_run)
+
+
+def _finest(problem: Problem, system: System) -> Integration:
+    """As fine as what integrations are measured against."""
+    return unlimited(_limited(problem, finest(system)))
 
 
 def _scale(problem: Problem, mask: np.ndarray) -> np.ndarray:
@@ -81,9 +86,9 @@ def integration_error(problem: Problem, system: System, per_run: np.ndarray | No
 
 def begin_integration_error(problem: Problem, system: System) -> None:
     """Have a second process, where there is one, make the programs of `integration_error` of this problem."""
-    for integration in (unlimited(_limited(problem, finest(system))), problem.batch.integration):
+    for integration in (_finest(problem, system), problem.batch.integration):
         batch = dataclasses.replace(problem.batch, integration=integration)
-        begin_compiled(system, batch, problem.per_run.names)
+        begin_compiled(system, batch, problem.per_run.names, np.asarray(problem.per_run.start))
 
 
 def _of_tries(integration: Integration, most: np.ndarray) -> Integration:

@@ -180,30 +180,38 @@ def _shown(
     return levels.near(output, samples[number], level[number])
 
 
-def _compiled_runs(
+class _StartedRun(NamedTuple):
+    """One run before it is simulated: its model, state at the start and inputs, and what its sensor shows levels by."""
+
+    system: System
+    initial: State | None
+    inputs: dict[str, Array]
+    levels: LevelTerm | None
+    own: tuple[Array | np.ndarray, Array | np.ndarray] | None
+
+
+def _started_runs(
     system: System, batch: RunBatch, names: Sequence[str], values: np.ndarray, shown: bool = True
-) -> Iterator[tuple[Trajectory, list[np.ndarray]]]:
-    """Of each run, with its `values` (R, names): its trajectory, and what its sensors show, where that is asked for."""
+) -> Iterator[_StartedRun]:
+    """Each run with its `values` (R, names). `shown`: whether what its sensors show is asked for."""
     series = {name: np.asarray(one) for name, one in batch.inputs.items()}
     seen = batch.seen_by(system) if shown else None
     for number in range(batch.runs):
         inputs = {name: jnp.asarray(one[number]) for name, one in series.items()}
         own = None if seen is None else (seen.samples[number], seen.level[number])
-        here, initial, levels = _started(
-            system, names, [jnp.asarray(one) for one in values[number]], inputs, own is not None
-        )
-        run = compiled_run(here, inputs, batch.dt, batch.integration, initial)
-        outputs = batch.outputs if shown else ()
-        yield run, [np.asarray(_shown(here, run, name, levels, own, k)) for k, name in enumerate(outputs)]
+        row = [jnp.asarray(one) for one in values[number]]
+        here, initial, levels = _started(system, names, row, inputs, own is not None)
+        yield _StartedRun(here, initial, inputs, levels, own)
 
 
-def begin_compiled(system: System, batch: RunBatch, more_names: Sequence[str] = ()) -> None:
-    """Have a second process, where there is one, make the program of `predict_compiled` with these arguments: it is one for all runs."""
-    inputs = {name: jnp.asarray(np.asarray(one)[0]) for name, one in batch.inputs.items()}
-    names = (*batch.override_names, *more_names)
-    seen = batch.seen_by(system) is not None
-    here, initial, _ = _started(system, names, [jnp.zeros(())] * len(names), inputs, seen)
-    begin_compiled_run(here, inputs, batch.dt, batch.integration, initial)
+def _compiled_runs(
+    system: System, batch: RunBatch, names: Sequence[str], values: np.ndarray, shown: bool = True
+) -> Iterator[tuple[Trajectory, list[np.ndarray]]]:
+    """Of each run, with its `values` (R, names): its trajectory, and what its sensors show, where that is asked for."""
+    outputs = batch.outputs if shown else ()
+    for one in _started_runs(system, batch, names, values, shown):
+        run = compiled_run(one.system, one.inputs, batch.dt, batch.integration, one.initial)
+        yield run, [np.asarray(_shown(one.system, run, name, one.levels, one.own, k)) for k, name in enumerate(outputs)]
 
 
 def simulate_batch(system: System, batch: RunBatch) -> Trajectory:
@@ -231,14 +239,28 @@ def states_by_run(packed: Trajectory, runs: Sequence[Run], names: Sequence[str])
     }
 
 
+def _values(batch: RunBatch, more_names: Sequence[str], more: np.ndarray | None) -> tuple[tuple[str, ...], np.ndarray]:
+    """(what each run has values of, these, (R, names)): its overrides, and `more` of `more_names`."""
+    own = np.asarray(batch.overrides)
+    return (*batch.override_names, *more_names), own if more is None else np.concatenate(
+        [own, np.asarray(more)], axis=1
+    )
+
+
 def predict_compiled(
     system: System, batch: RunBatch, more_names: Sequence[str] = (), more: np.ndarray | None = None
 ) -> np.ndarray:
     """`predict_batch` for a call by itself, outside of `jit`, `vmap` and `grad`: (series, N), numpy."""
-    names, values = (*batch.override_names, *more_names), np.asarray(batch.overrides)
-    if more is not None:
-        values = np.concatenate([values, np.asarray(more)], axis=1)
-    return np.stack([one for _, outputs in _compiled_runs(system, batch, names, values) for one in outputs])
+    runs = _compiled_runs(system, batch, *_values(batch, more_names, more))
+    return np.stack([one for _, outputs in runs for one in outputs])
+
+
+def begin_compiled(
+    system: System, batch: RunBatch, more_names: Sequence[str] = (), more: np.ndarray | None = None
+) -> None:
+    """Have a second process, where there is one, make the program of `predict_compiled` with these arguments: it is one for all runs."""
+    one = next(_started_runs(system, batch, *_values(batch, more_names, more)))
+    begin_compiled_run(one.system, one.inputs, batch.dt, batch.integration, one.initial)
 
 
 def predict_batch(
