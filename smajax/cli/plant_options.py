@@ -34,7 +34,7 @@ Drawn = Annotated[
     typer.Option(
         "--plants",
         min=0,
-        help="plants drawn from the posterior of --model, in the place of mismatches; default 16 with --model, 0 for none",
+        help="plants drawn from the posterior of --model, in the place of mismatches, or of more than two mismatches; default 16 with --model, 0 for none, 64 of mismatches",
     ),
 ]
 OtherPlant = Annotated[

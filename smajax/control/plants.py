@@ -32,6 +32,7 @@ class PlantSet:
     # (columns,), the plant as its controller assumes it.
     nominal: np.ndarray = field(default_factory=lambda: np.ones(len(MISMATCHES)))
     batch: np.ndarray | None = None  # (plants, columns), SI
+    units: tuple[str, ...] = ()  # of the columns of a batch
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -68,14 +69,17 @@ def plant_set(system: System, plants: Plants | None = None) -> PlantSet:
     """
     unit, system = unit_of(system), carrying(system, plants)
     if plants is None:
-        table = mismatches_of(system)
-        return PlantSet(Perturbation(tuple(table), tuple(table.values())), unit, np.ones(len(table)))
+        mismatches = mismatches_of(system)
+        return PlantSet(Perturbation(tuple(mismatches), tuple(mismatches.values())), unit, np.ones(len(mismatches)))
     values = _values(system, plants)
     names = tuple(values)
     batch = np.stack([values[name] for name in names], axis=1)
     check_bounds(set_parameters(system, values))
     nominal = np.asarray(get_parameters(system, names), dtype=float)
-    return PlantSet(Perturbation(names, names, absolute=True), unit, nominal, batch)
+    table = parameters(system)
+    return PlantSet(
+        Perturbation(names, names, absolute=True), unit, nominal, batch, tuple(table[name].unit for name in names)
+    )
 
 
 def _values(system: System, plants: Plants) -> dict[str, np.ndarray]:

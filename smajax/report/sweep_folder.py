@@ -11,6 +11,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from smajax.control.sweep.grid import Grid
 from smajax.control.sweep.run_sweep import CACHED, ControllerSweep, SweepResults
 from smajax.core.files import as_netcdf, replace
 from smajax.core.progress import Message, Progress, quiet
@@ -19,6 +20,7 @@ from smajax.report.drawing import UPRIGHT
 from smajax.report.next_steps import after_sweep
 from smajax.report.pictures import as_png
 from smajax.report.series_plot import SeriesPlot
+from smajax.report.sweep_batch_picture import draw_batch
 from smajax.report.sweep_dataset import as_dataset
 from smajax.report.sweep_numbers import IN_PICTURE, comparison_digest, digest_of, lines_digest, map_numbers
 from smajax.report.sweep_page import (
@@ -69,9 +71,9 @@ def write_sweep(
     for one in sweeps:
         results.append(one)
         write_rows(out / f"{one.name}.csv", grid, one)
-        over_grid, size = (draw_maps, MAPS) if grid.second else (draw_curves, CURVES)
+        over_grid, size = _drawn_over(grid, air)
         numbers = digest_of(map_numbers(grid, one))
-        write_picture(f"{one.name}_maps.png", size, partial(over_grid, grid=grid, sweep=one, air=air), numbers)
+        write_picture(f"{one.name}_maps.png", size, partial(over_grid, sweep=one), numbers)
         if one.lines:
             plots[one.name] = lines_plot(time, settings.line_ratios, one, target, unit, air)
             what: dict[str, Any] = {
@@ -102,6 +104,15 @@ def write_sweep(
     steps = after_sweep(out, remarks.plant, best, settings.set_points, unit.shown, remarks.gains.get(best, ""))
     replace(out / "index.html", page(whole, pictures, command, remarks, plots, steps))
     return whole
+
+
+def _drawn_over(grid: Grid, air: float) -> tuple[Callable[..., None], tuple[float, float]]:
+    """(what draws the figures of merit of a controller over the plants, the size of its picture)."""
+    if grid.numbered:
+        return partial(draw_batch, grid=grid), MAPS
+    if grid.second:
+        return partial(draw_maps, grid=grid, air=air), MAPS
+    return partial(draw_curves, grid=grid, air=air), CURVES
 
 
 def numbered_png(draw: Callable[[Figure], None], size: tuple[float, float], dpi: int, numbers: str) -> bytes:

@@ -25,6 +25,7 @@ from smajax.report.integration_words import integration_sentence
 from smajax.report.next_steps import ARM, PlantWords, Step, section
 from smajax.report.plain_page import bullets, folded, headline, table, whole
 from smajax.report.series_plot import SeriesPlot, moving, samples_of
+from smajax.report.sweep_batch_picture import ACROSS
 from smajax.report.sweep_numbers import SHOWN, merit_values, nominal_gain, shown_in
 from smajax.report.sweep_pictures import ROUNDING
 
@@ -198,11 +199,7 @@ def page(
         if unit.is_angle
         else "The position has arrived when it is within a hundredth of the stroke."
     )
-    drawn_as = (
-        "Maps: median over the set points that the plant can reach, and the worst of them beside it"
-        if grid.second
-        else "Lines: median over the set points that the plant can reach; bands: their range, where all have a value"
-    )
+    drawn_as = _drawn_as(grid)
     head = [
         "controller",
         "settles at",
@@ -229,6 +226,19 @@ def page(
         "<p class=quiet>The same numbers: sweep.json, sweep.nc (every loop, with named axes and units), and a CSV file for each controller.</p>",
     ]
     return whole("Controllers compared", [str(part) for part in parts])
+
+
+def _drawn_as(grid: Grid) -> str:
+    """What the pictures of a controller show."""
+    if grid.numbered:
+        fewer = ", of those parameters on which they hang most" if len(grid.plants.columns) > ACROSS else ""
+        return (
+            "A point is a plant: median over the set points that it can reach, a ring the worst of them, over the value of each parameter"
+            f"{fewer}; dashed what the controller assumes"
+        )
+    if grid.second:
+        return "Maps: median over the set points that the plant can reach, and the worst of them beside it"
+    return "Lines: median over the set points that the plant can reach; bands: their range, where all have a value"
 
 
 def _what_differs(results: SweepResults, drawn_as: str) -> str:

@@ -72,14 +72,12 @@ def draw_curves(figure: Figure, grid: Grid, sweep: ControllerSweep, air: float |
         least, middle, largest = several
         axes.plot(grid.ratios, middle, "o-", color=COLOURS[0], markersize=3, linewidth=1.3)
         axes.fill_between(grid.ratios, least, largest, color=COLOURS[0], alpha=0.2, linewidth=0)
-        if not grid.numbered:
-            axes.set(xscale="log", xlim=_edges(grid.ratios)[[0, -1]])
-            axes.axvline(1.0, color="#9aa0a8", linewidth=1.0, linestyle="--")
-            _ratio_axis(axes.xaxis, grid.ratios, grid.first, air)
+        axes.set(xscale="log", xlim=_edges(grid.ratios)[[0, -1]])
+        axes.axvline(1.0, color="#9aa0a8", linewidth=1.0, linestyle="--")
+        _ratio_axis(axes.xaxis, grid.ratios, grid.first, air)
         gaps = f"; no line: {GREY[name][1]}" if name in GREY and np.isnan(middle).any() else ""
         in_kelvins = bool(kelvins(air, grid.first, 1.0))
-        across = "plant of the batch" if grid.numbered else mismatch_words(grid.first, in_kelvins)
-        named(axes, across, f"{label} ({unit}{gaps})")
+        named(axes, mismatch_words(grid.first, in_kelvins), f"{label} ({unit}{gaps})")
         if np.isnan(middle).all():  # no value: no scale
             axes.set_yticks([])
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -37,10 +37,13 @@ from smajax.cli.terminal import browse, command_line, console, resumable
 if TYPE_CHECKING:
     from smajax.control.gains_file import Gains
     from smajax.control.loop_settings import LoopInUse, LoopSettings
+    from smajax.control.plants import Plants
     from smajax.control.sweep.run_sweep import SweepSettings
     from smajax.model.system import System
 
 SEED = 0  # of plants drawn from a posterior
+AXES = 2  # mismatches that a map has place for
+SPREAD_FAST = 16  # plants of more mismatches, with --fast
 
 
 def _tuned(files: Sequence[Path], options: PlantOptions) -> tuple[Gains, ...]:
@@ -69,31 +72,48 @@ class _Options:
     gain_ratios: str | None
     fast: bool
 
-    def mismatches(self, plant: System) -> dict[str, str]:
-        """Both names of --over, "" for the second where there is one alone; nothing without the option. Raises typer.BadParameter."""
+    def mismatches(self, plant: System) -> tuple[str, ...]:
+        """The names of --over, none without the option. Raises typer.BadParameter."""
         from smajax.control.mismatch import mismatches_of, short_name
         from smajax.control.sweep.grid import check_mismatches
 
         if self.over is None:
-            return {}
-        first, _, second = (part.strip() for part in self.over.strip(" ,").partition(","))
+            return ()
         if "=" in self.over:
             raise typer.BadParameter(
                 f"names alone, as in `convection,damping`, not `{self.over}`: each goes from -50% to +100% in --points steps.",
                 param_hint="--over",
             )
-        if not first or "," in second:
+        names = tuple(short_name(part.strip()) for part in self.over.strip(" ,").split(","))
+        with refused("--over"):
+            check_mismatches(names, tuple(mismatches_of(plant)))
+        if len(names) > AXES and self.points:
             raise typer.BadParameter(
-                f"one mismatch, or two with a comma between them, not `{self.over}`. More of them at once are a batch of plants: "
-                "`sweep_controllers(..., plants=...)` in Python (docs/reference/control.md).",
-                param_hint="--over",
+                f"are the sides of a map, and {len(names)} mismatches are on plants spread over all of them: give --plants, their number.",
+                param_hint="--points",
             )
-        first, second = short_name(first), short_name(second)
-        try:
-            check_mismatches(first, second, tuple(mismatches_of(plant)))
-        except ValueError as error:
-            raise typer.BadParameter(str(error), param_hint="--over") from None
-        return {"first": first, "second": second}
+        return names
+
+    def plants(self, assumed: System, plant: LoopPlants, limit: float | None) -> Plants | None:
+        """What the loops run on in the place of mismatches: of more than a map has axes plants that differ in all of them. Raises typer.BadParameter."""
+        names = self.mismatches(assumed)
+        if len(names) <= AXES:
+            return plant.plants(SEED, others=bool(names), limit=limit)
+        from smajax.control.sweep.spread_plants import SPREAD, spread_plants
+
+        replace(plant, drawn=None).plants(SEED, others=True, limit=limit)  # raises for --plant
+        count = (SPREAD_FAST if self.fast else SPREAD) if plant.drawn is None else plant.drawn
+        with refused("--plants"):
+            return spread_plants(assumed, names, count, *self.ratio_range().values())
+
+    def ratio_range(self) -> dict[str, float]:
+        """`least` and `most` of --ratios, nothing without it. Raises typer.BadParameter."""
+        if self.ratios is None:
+            return {}
+        both = numbers("--ratios", self.ratios)
+        if len(both) != 2:
+            raise typer.BadParameter(f"two numbers, such as 0.9,1.1, not `{self.ratios}`", param_hint="--ratios")
+        return dict(zip(("least", "most"), both, strict=True))
 
     def settings(self, plant: System, tuned: tuple[Gains, ...], **loop: Any) -> SweepSettings:
         """loop: further fields of `SweepSettings`. Raises typer.BadParameter."""
@@ -101,13 +121,14 @@ class _Options:
 
         request = self.controllers or ",".join(dict.fromkeys(one.controller for one in tuned)) or "all"
         named = [part.strip() for part in request.split(",")]
-        given: dict[str, Any] = {**self.mismatches(plant), **set_points_of(plant, self.set_points, self.fast), **loop}
+        given: dict[str, Any] = {**set_points_of(plant, self.set_points, self.fast), **loop}
+        names = self.mismatches(plant)
+        if 0 < len(names) <= AXES:
+            given |= dict(zip(("first", "second"), (*names, ""), strict=False))
         if self.points or self.fast:
             given["points"] = self.points or 3
         if self.ratios is not None:
-            given["ratio_range"] = numbers("--ratios", self.ratios)
-            if len(given["ratio_range"]) != 2:
-                raise typer.BadParameter(f"two numbers, such as 0.9,1.1, not `{self.ratios}`", param_hint="--ratios")
+            given["ratio_range"] = tuple(self.ratio_range().values())
         if self.gain_ratios is not None or self.fast:
             given["gain_ratios"] = numbers("--gain-ratios", "1" if self.gain_ratios is None else self.gain_ratios)
         controllers = None if named == ["all"] else [*dict.fromkeys(part for part in named if part)]
@@ -152,7 +173,7 @@ def sweep(
     over: Annotated[
         str | None,
         typer.Option(
-            help="the two mismatches of the maps, or one of curves; names alone: each goes from -50% to +100%; default convection,damping",
+            help="the two mismatches of the maps, one of curves, or more, of which all differ at once on --plants plants; names alone: each goes from -50% to +100%; default convection,damping",
             autocompletion=completion.mismatches,
         ),
     ] = None,
@@ -220,6 +241,8 @@ def sweep(
 
     Example:  smajax sweep --controllers pid,sld --over convection,ambient --out sweep
 
+    Example:  smajax sweep --controllers pid,sld --over inertia,damping,convection --plants 128
+
     Example:  smajax sweep --model report/model.toml --controllers pid --gains tuned/gains.json
 
     Example:  smajax sweep --wire flexinol_ht_500um --load bias_spring --drive voltage --set-point 5mm,10mm --fast
@@ -243,7 +266,6 @@ def sweep(
     with refused():
         loop = loop_of(tuned, given)
     assumed = plant.system(loop.command_limit)
-    plants = plant.plants(SEED, others=over is not None, limit=loop.command_limit)
     with refused():
         sigma, source = plant.noise(noise, unit_of(assumed))
     between: dict[str, Any] = {"period": loop.period, "delay": loop.delay, "estimator": loop.estimator}
@@ -252,6 +274,7 @@ def sweep(
     between |= {} if counted is None else {"quantum": counted}
     between |= {} if seconds is None else {"seconds": seconds}
     options = _Options(controllers, over, points, ratios, set_points, gain_ratios, fast)
+    plants = options.plants(assumed, plant, loop.command_limit)
     settings = options.settings(assumed, tuned, tolerance=tolerance_of(tolerance), **between)
     with refused():
         settings.check(assumed, plants)

@@ -35,19 +35,25 @@ def loop_rows(
     return np.stack([np.ravel(column) for column in np.broadcast_arrays(*columns, target, gain)], axis=1)
 
 
-def check_mismatches(first: str, second: str, known: Sequence[str] = tuple(MISMATCHES)) -> None:
-    """Raise ValueError for an unknown mismatch, or twice the same; `second` is "" for a sweep over the first alone."""
-    for name in (first, second) if second else (first,):
+def check_mismatches(names: Sequence[str], known: Sequence[str] = tuple(MISMATCHES)) -> None:
+    """Raise ValueError for an unknown mismatch, twice the same, and none."""
+    for name in names:
         if name not in known:
             raise ValueError(f"no mismatch `{name}`{close_matches(name, known, 'there are')}.")
-    if first == second:
-        raise ValueError(f"`{first}` twice, expected one mismatch or two different ones of {', '.join(known)}.")
+    twice = [name for number, name in enumerate(names) if name in names[:number]]
+    if twice or not names:
+        got = f"`{twice[0]}` twice" if twice else "no mismatch"
+        raise ValueError(f"{got}, expected one mismatch or different ones of {', '.join(known)}.")
+
+
+def ratios_at(sides: np.ndarray, least: float = LEAST, most: float = MOST) -> np.ndarray:
+    """Ratios from `least` at -1 to `most` at 1, evenly by logarithm to either side of 0, where the ratio is 1."""
+    return np.exp(np.abs(sides) * np.log(np.where(sides < 0.0, least, most)))
 
 
 def sweep_ratios(points: int, least: float = LEAST, most: float = MOST) -> np.ndarray:
-    """`points` ratios from `least` to `most`, evenly by logarithm to either side of 1; an odd number includes 1."""
-    sides = np.linspace(-1.0, 1.0, points)
-    return np.exp(np.abs(sides) * np.log(np.where(sides < 0.0, least, most)))
+    """`points` ratios from `least` to `most`, as `ratios_at`; an odd number includes 1."""
+    return ratios_at(np.linspace(-1.0, 1.0, points), least, most)
 
 
 @dataclass(frozen=True)
@@ -66,7 +72,7 @@ class Grid:
 
     def __post_init__(self) -> None:
         if self.plants.batch is None:
-            check_mismatches(self.first, self.second, self.plants.columns)
+            check_mismatches(self.mismatches, self.plants.columns)
 
     @property
     def numbered(self) -> bool:
