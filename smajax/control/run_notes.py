@@ -10,6 +10,7 @@ from typing import Any, TypeAlias
 from smajax.control.gains_file import Gains
 from smajax.control.loop_settings import OPTIONS, LoopSettings
 from smajax.control.presets import CONTROLLERS
+from smajax.control.scales import ARM_LIMIT, is_arm, limited_as
 from smajax.model.system import System
 
 MOST_SET_POINTS = 50  # with figures of merit; more are a ramp or a sine of a file
@@ -43,6 +44,14 @@ class PresetGains:
 
 
 @dataclass(frozen=True)
+class VoltagesOfLimit:
+    """The voltages among the gains of the arm's presets keep their share of the largest command."""
+
+    limit: float  # of the drive, V
+    preset: float  # that the presets were searched for, V
+
+
+@dataclass(frozen=True)
 class GainsOfFile:
     """The gains are those of a file."""
 
@@ -63,7 +72,7 @@ class InputLagLeftOut:
     delay: float | None = None  # s, as fitted; None of a clock that runs slow or fast
 
 
-Source: TypeAlias = LimitOfFitRuns | NoiseOfModelFile | PresetGains | GainsOfFile | InputLagLeftOut
+Source: TypeAlias = LimitOfFitRuns | NoiseOfModelFile | PresetGains | VoltagesOfLimit | GainsOfFile | InputLagLeftOut
 
 
 @dataclass(frozen=True)
@@ -151,6 +160,13 @@ Note: TypeAlias = (
     | TooManySetPoints
     | str
 )
+
+
+def voltages_of_limit(system: System) -> list[VoltagesOfLimit]:
+    """One on an arm whose drive has another limit than the presets'; gains of a file have their own voltages."""
+    limit = limited_as(system) if is_arm(system) else None
+    other = limit is not None and not math.isclose(float(limit), ARM_LIMIT, rel_tol=1e-6)
+    return [VoltagesOfLimit(float(limit), ARM_LIMIT)] if limit is not None and other else []
 
 
 def gains_of_files(

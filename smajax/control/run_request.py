@@ -50,6 +50,7 @@ from smajax.control.run_notes import (
     StraightLines,
     TooManySetPoints,
     gains_of_files,
+    voltages_of_limit,
 )
 from smajax.control.run_result import RunResult, mismatches
 from smajax.control.scales import is_arm
@@ -269,7 +270,7 @@ def _assumed(request: RunRequest, loop: LoopRequest) -> _Assumed:
         sensor = noise, float(unit.to_own(noise_of(loop.quantum, unit)))
     own = settings_of(system, merged, *sensor)
     of_gains = (
-        [PresetGains(gains.controller, not is_arm(system))]
+        [PresetGains(gains.controller, not is_arm(system)), *voltages_of_limit(system)]
         if loop.gains is None
         else gains_of_files([gains], system, loop.given, own)
     )

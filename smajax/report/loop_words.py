@@ -13,6 +13,7 @@ from smajax.control.run_notes import (
     NoiseOfModelFile,
     PresetGains,
     Source,
+    VoltagesOfLimit,
 )
 from smajax.core.display_units import digits, display
 from smajax.core.wording import and_listed, counted
@@ -99,6 +100,12 @@ def source_sentence(source: Source | None) -> str:
             return (
                 f"No gains file: the gains are those of the preset of {controller}{how}, and not tuned on this plant; `smajax tune {controller}` "
                 "tunes them, and --gains takes its gains.json."
+            )
+        case VoltagesOfLimit(limit, preset):
+            low = "; low levels of a switch stay" if limit > preset else ""
+            return (
+                f"The drive's limit is {digits(limit, 4)} V and was {digits(preset, 4)} V where the gains of the presets were searched: their voltages are "
+                f"{digits(limit / preset, 3)} times as large{low}."
             )
         case InputLagLeftOut():
             return _input_lag_sentence(source)

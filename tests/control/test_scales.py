@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 import jax
 import jax.numpy as jnp
@@ -12,12 +13,15 @@ import pytest
 from smajax.control.controllers.preset import WIDER
 from smajax.control.least_time import command_limit
 from smajax.control.presets import CONTROLLERS, pid
+from smajax.control.run_notes import voltages_of_limit
 from smajax.control.scales import HEADROOM, arm_scales, exponents, factors_for, scales_of, unit_on
 from smajax.core.parameters import get_parameters, parameter_values, parameters, set_parameters
 from smajax.model.presets import build
 from smajax.model.rigs import arm
 from smajax.model.system import System
+from smajax.report.loop_words import source_sentences
 from smajax.simulation.compiled import simulate_compiled
+from tests.helpers.small_bench import smajax
 
 HANGING = build("flexinol_table_3_2", "dead_weight", "flexinol_voltage")
 SPRING = build("flexinol_ht_500um", "bias_spring", "voltage")
@@ -165,3 +169,30 @@ def test_a_limit_that_jax_traces_gives_the_same_controller(limit: float) -> None
     slopes = jax.jacrev(voltages)(jnp.asarray(limit))
     np.testing.assert_allclose(slopes, jax.jacfwd(voltages)(jnp.asarray(limit)))
     assert np.isfinite(slopes).all()
+
+
+@pytest.mark.parametrize(
+    ("limit", "said"),
+    [
+        (
+            30.6,
+            "is 17 V and was 10 V where the gains of the presets were searched: their voltages are 1.7 times as large; low levels",
+        ),
+        (
+            9.0,
+            "is 5 V and was 10 V where the gains of the presets were searched: their voltages are 0.5 times as large.",
+        ),
+        (18.0, ""),  # the presets' own
+        (1000.0, ""),  # nobody knows it
+    ],
+)
+def test_it_is_said_by_how_much_another_limit_changes_the_voltages_of_presets(limit: float, said: str) -> None:
+    sentences = source_sentences(voltages_of_limit(set_parameters(arm(), {"amplifier_limit": limit})))
+    assert len(sentences) == bool(said)
+    assert all(said in one for one in sentences)
+    assert voltages_of_limit(SPRING) == []  # of another load all gains are scaled, which is said by itself
+
+
+def test_a_run_says_it(tmp_path: Path) -> None:
+    words = ["simulate", "--controller", "pid", "--set", "amplifier_limit=12", "--set-point", "-40deg:1s", "--no-open"]
+    assert "their voltages are 0.667 times as large" in smajax(*words, "--out", tmp_path / "run").out

@@ -147,15 +147,17 @@ def loop_of(tuned: Sequence[Gains], given: LoopSettings) -> LoopInUse:
 
 
 def _sentences(tuned: Sequence[Gains], given: LoopSettings, plant: System, settings: SweepSettings) -> tuple[str, ...]:
-    """What the loops take from the files of gains."""
+    """What the loops take from the files of gains, and how the gains of presets follow the drive's limit."""
     from smajax.control.loop_settings import LoopInUse, settings_of
     from smajax.control.position_unit import unit_named
-    from smajax.control.run_notes import gains_of_files
+    from smajax.control.run_notes import gains_of_files, voltages_of_limit
     from smajax.report.loop_words import source_sentences
 
     sensor = [float(unit_named(settings.unit).to_own(one)) for one in (settings.noise, settings.quantum)]
     own = settings_of(plant, LoopInUse(None, settings.period, settings.delay, settings.estimator), *sensor)
-    return source_sentences(gains_of_files(tuned, plant, given, own, settings.controllers))
+    presets = set(settings.controllers) - {one.controller for one in tuned}
+    limited = voltages_of_limit(plant) if presets else []
+    return source_sentences([*gains_of_files(tuned, plant, given, own, settings.controllers), *limited])
 
 
 # More than 8 parameters and 80 lines: typer reads the options from them.
