@@ -55,6 +55,33 @@ def test_a_model_file_becomes_a_unit(tmp_path, monkeypatch):
         run(model, "--to", "fmu", "--out", out)
 
 
+def test_presets_become_a_unit_before_anything_is_measured(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    parts = ["--wire", "flexinol_table_3_2", "--load", "dead_weight", "--drive", "voltage"]
+    code, printed, _ = run("--to", "fmu", *parts, "--set", "load_mass=120 g", "--source-only", "--json")
+    assert code == 0
+    told = json.loads(printed)
+    assert told["title"] == "Model of an actuator: flexinol_table_3_2, dead_weight, voltage"
+    assert told["files"] == ["flexinol_table_3_2_dead_weight.fmu"]
+    assert "voltage" in told["inputs"]
+    # As that of a model file of the same presets and values.
+    model = model_of_presets(*parts[1::2]).save(tmp_path / "model.toml")
+    other = Path("other") / told["files"][0]
+    assert run(model, "--to", "fmu", "--set", "load_mass=120 g", "--source-only", "--out", other)[0] == 0
+    own, of_file = (
+        zipfile.ZipFile(one).read("sources/flexinol_table_3_2_dead_weight.c") for one in (other.name, other)
+    )
+    assert own == of_file
+    for words, said in (
+        ([], "or the presets of --wire, --load and --drive"),
+        (["--model", "model.toml"], "give it as FILE, `smajax export model.toml`"),
+        ([*parts, "--period", "10ms"], "--estimator, --period and --delay are for gains.json"),
+    ):
+        code, _, told = run("--to", "fmu", *words, "--out", "third.fmu")
+        assert code == 2
+        assert said in " ".join(told.replace("│", " ").split())
+
+
 def test_gains_become_a_header_and_a_source(tmp_path):
     gains = gains_file(tmp_path, proportional_gain=7.5)
     code, printed, _ = run(gains, "--to", "c", "--out", tmp_path / "bench", "--period", "5ms")

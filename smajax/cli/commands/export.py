@@ -23,16 +23,18 @@ ARITHMETIC = {"single": "float", "double": "double"}  # option -> C's type
 @with_plant_options
 def export(
     file: Annotated[
-        Path,
-        typer.Argument(help="model.toml (or its folder) of close-loop or identify; gains.json of tune"),
-    ],
+        Path | None,
+        typer.Argument(
+            help="model.toml (or its folder) of close-loop or identify; gains.json of tune; none: the presets of --wire, --load and --drive"
+        ),
+    ] = None,
+    *,
     to: Annotated[str, typer.Option("--to", help="`fmu`, or `c` for C99")],
     out: Annotated[
         Path | None,
-        typer.Option(help="the .fmu file, or the folder of the C; default: named after FILE, here"),
+        typer.Option(help="the .fmu file, or the folder of the C; default: named after FILE or the presets, here"),
     ] = None,
     fmi: Annotated[str, typer.Option(help="version of the interface of an FMU: 2.0 or 3.0")] = "2.0",
-    *,
     plant: PlantOptions,
     estimator: Estimator = None,
     period: Period = None,
@@ -56,10 +58,12 @@ def export(
 ) -> None:
     """Take a model or a tuned controller out of Python: an FMU for Simulink and others, or C99 for a microcontroller.
 
-    Of gains --wire, --load and --drive, or --model, say which plant the controller assumes; default: the arm. Nothing of Python or JAX is
-    in what is written.
+    Of gains --wire, --load and --drive, or --model, say which plant the controller assumes; default: the arm. Without a file they are the
+    model, before there is anything measured. Nothing of Python or JAX is in what is written.
 
     Example:  smajax export report/model.toml --to fmu --out actuator.fmu
+    Example:  smajax export --to fmu --wire flexinol_ht_500um --load bias_spring --drive voltage
+
     Example:  smajax export tuned/gains.json --to c --model report/model.toml --estimator model --out bench
     """
     from smajax.core.runtime import prepare
@@ -78,7 +82,7 @@ def export(
         raise typer.BadParameter(f"`single` or `double`, not `{arithmetic}`.", param_hint="--arithmetic")
     if arithmetic is not None and to == "fmu":
         raise typer.BadParameter("of `--to c`; an FMU computes in double precision.", param_hint="--arithmetic")
-    stem = file.parent.resolve().name if file.stem in ("model", "gains") and file.parent.name else file.stem
+    stem = _stem(file, plant)
     path = out or (Path(f"{stem}.fmu") if to == "fmu" else Path(f"{stem}_c"))
     name = identifier(path.stem if to == "fmu" else stem)
     check_free([path] if to == "fmu" else c_paths(path, name), overwrite)
@@ -93,9 +97,23 @@ def export(
     _print(source, written, to)
 
 
+def _stem(file: Path | None, plant: PlantOptions) -> str:
+    """What is written is named after. Raises typer.BadParameter without a file and presets."""
+    if file is not None:
+        return file.parent.resolve().name if file.stem in ("model", "gains") and file.parent.name else file.stem
+    if plant.model is not None:
+        raise typer.BadParameter(f"of a model: give it as FILE, `smajax export {plant.model}`.", param_hint="--model")
+    if not (plant.wire or plant.load or plant.drive):
+        raise typer.BadParameter(
+            "a model.toml, a gains.json, or the presets of --wire, --load and --drive; `smajax presets` lists them.",
+            param_hint="FILE",
+        )
+    return f"{plant.wire}_{plant.load}"
+
+
 # More than 8 parameters: the command's options, handed on.
 def _source(
-    file: Path,
+    file: Path | None,
     plant: PlantOptions,
     name: str,
     estimator: str | None,
@@ -109,7 +127,7 @@ def _source(
     from smajax.export.from_files import controller_source, plant_source
 
     kind = None if arithmetic is None else ARITHMETIC[arithmetic]
-    if file.suffix == ".json":
+    if file is not None and file.suffix == ".json":
         if period is not None and period <= 0.0:
             raise typer.BadParameter(f"more than 0 s, not {period:g} s.", param_hint="--period")
         system = plant.system()
@@ -128,14 +146,19 @@ def _source(
             raise typer.BadParameter(str(error), param_hint="FILE") from None
         except KeyError as error:
             raise typer.BadParameter(str(error.args[0]), param_hint="--estimator") from None
-    if plant.model or plant.by_parts or any(one is not None for one in (estimator, delay, period)):
+    if any(one is not None for one in (estimator, delay, period)) or (file and (plant.model or plant.by_parts)):
         raise typer.BadParameter(
-            "--estimator, --period, --delay, --model, --wire, --load, --drive and --law are for gains.json; a model file says all of a model but "
-            "what --set changes.",
+            "--estimator, --period and --delay are for gains.json, and --model, --wire, --load, --drive and --law for that or for no file; a model "
+            "file says all of a model but what --set changes.",
             param_hint="FILE",
         )
-    system, title = _model(file, plant.values or [])
+    system, title = _of_presets(plant) if file is None else _model(file, plant.values or [])
     return plant_source(system, name, title, tolerance, kind or "double")
+
+
+def _of_presets(plant: PlantOptions) -> tuple[System, str]:
+    """(the system of named presets, its title). Raises typer.BadParameter."""
+    return plant.bare(), f"Model of an actuator: {plant.wire}, {plant.load}, {plant.drive}"
 
 
 def _model(file: Path, values: list[str]) -> tuple[System, str]:
