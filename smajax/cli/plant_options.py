@@ -34,7 +34,7 @@ Drawn = Annotated[
     typer.Option(
         "--plants",
         min=0,
-        help="plants drawn from the posterior of --model, in the place of mismatches, or of more than two mismatches; default 16 with --model, 0 for none, 64 of mismatches",
+        help="plants drawn from the posterior of --model, in the place of mismatches (default 16, 0 for none); of more than two mismatches of `sweep --over` those that are spread over all of them (default 64)",
     ),
 ]
 OtherPlant = Annotated[
@@ -232,7 +232,10 @@ class LoopPlants(PlantOptions):
         """As `plants`, stacked."""
         if self.kept is None:
             if count:
-                raise typer.BadParameter("are drawn from a model's posterior: give --model.", param_hint="--plants")
+                raise typer.BadParameter(
+                    "are drawn from a model's posterior, or differ in more than two mismatches: give --model, or `sweep --over` with three names.",
+                    param_hint="--plants",
+                )
             return None
         if others and count:
             raise typer.BadParameter(

@@ -259,9 +259,15 @@ def after_tune(
 
 
 def after_sweep(
-    folder: Path, plant: PlantWords, best: str, set_points: Sequence[float], unit: str, gains: str = ""
+    folder: Path,
+    plant: PlantWords,
+    best: str,
+    set_points: Sequence[float],
+    unit: str,
+    gains: str = "",
+    mismatch: str = "",
 ) -> list[Step]:
-    """best: the controller to go on with. gains: its file, where it has one."""
+    """best: the controller to go on with. gains: its file, where it has one. mismatch: the plant of a batch that it bears worst."""
     target = f"{sorted(set_points)[len(set_points) // 2]:g}{unit}:10s"
     given = ("--gains", gains) if gains else ("--controller", best)
     steps = [
@@ -270,6 +276,11 @@ def after_sweep(
             command("simulate", *plant.of_simulate(), *given, "--set-point", target, "--out", "loop"),
         )
     ]
+    if mismatch:
+        own = command(
+            "simulate", *plant.of_simulate(), *given, "--set-point", target, "--mismatch", mismatch, "--out", "worst"
+        )
+        steps.append(Step("The same on the plant that it bears worst", own))
     steps.append(
         _to_c(gains, plant)
         if gains

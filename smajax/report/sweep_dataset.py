@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -18,6 +19,7 @@ def as_dataset(results: SweepResults, command: str) -> xr.Dataset:
 
     Times are infinite where a run never arrives or settles; `failed_at` is NaN where no loop failed. Least times, which the gain does not change, are
     infinite where the plant does not reach the set point with the largest command (of all controllers, of its own), and NaN where that has no limit.
+    Of a batch the values of its plants' parameters are coordinates along `plant`.
     """
     sweeps, grid = results.sweeps, results.grid
     ratios = grid.axis_names
@@ -36,12 +38,15 @@ def as_dataset(results: SweepResults, command: str) -> xr.Dataset:
     assumed = {"units": "1", "long_name": "plant over the value that the controller assumes"}
     if grid.numbered:
         assumed["long_name"] = "number of the plant in its batch"
-    axes = {
+    axes: dict[str, Any] = {
         "controller": [one.name for one in sweeps],
         **{name: (name, grid.ratios, assumed) for name in ratios},
         "set_point": ("set_point", grid.targets, {"units": results.unit.own}),
         "gain_ratio": ("gain_ratio", grid.gains, {"units": "1", "long_name": "ratio to the controller's main gain"}),
     }
+    if grid.plants.batch is not None:
+        for name, values, unit in zip(grid.plants.columns, grid.plants.batch.T, grid.plants.units, strict=True):
+            axes[name] = (grid.axis_names[0], values, {"units": unit, "long_name": "of the plant"})
     for name, least in (
         ("least_time", [one.least for one in sweeps]),
         ("least_time_own_limit", [one.own_least for one in sweeps]),

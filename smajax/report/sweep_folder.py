@@ -31,10 +31,11 @@ from smajax.report.sweep_page import (
     page,
     perturbed_sentence,
     ranked,
-    write_rows,
 )
 from smajax.report.sweep_pictures import common_limits, draw_comparison, draw_curves, draw_lines, draw_maps, lines_plot
+from smajax.report.sweep_plants import as_mismatch, hardest
 from smajax.report.sweep_record import as_json
+from smajax.report.sweep_rows import write_rows
 
 MAPS, CURVES = (10.0, 14.0), (10.0, 7.6)  # inches
 
@@ -101,7 +102,11 @@ def write_sweep(
     replace(out / "sweep.nc", as_netcdf(as_dataset(whole, command)))
     pictures = {name: ((out / name).read_bytes(), narrow) for name, narrow in upright.items()}
     best = ranked(whole)[0].name
-    steps = after_sweep(out, remarks.plant, best, settings.set_points, unit.shown, remarks.gains.get(best, ""))
+    worst = [hardest(grid, one, 1) for one in whole.sweeps if one.name == best] if grid.numbered else []
+    mismatch = as_mismatch(grid, worst[0][0].plant) if worst and worst[0] else ""
+    steps = after_sweep(
+        out, remarks.plant, best, settings.set_points, unit.shown, remarks.gains.get(best, ""), mismatch
+    )
     replace(out / "index.html", page(whole, pictures, command, remarks, plots, steps))
     return whole
 

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import html
-import io
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -17,7 +14,6 @@ from smajax.control.position_unit import DEGREES, PositionUnit
 from smajax.control.presets import CONTROLLERS, with_printed_law
 from smajax.control.sweep.grid import Grid
 from smajax.control.sweep.run_sweep import ControllerSweep, SweepResults
-from smajax.core.files import replace
 from smajax.core.provenance import made_with
 from smajax.core.wording import and_listed, counted
 from smajax.report.embedded import picture
@@ -28,6 +24,7 @@ from smajax.report.series_plot import SeriesPlot, moving, samples_of
 from smajax.report.sweep_batch_picture import ACROSS
 from smajax.report.sweep_numbers import SHOWN, merit_values, nominal_gain, shown_in
 from smajax.report.sweep_pictures import ROUNDING
+from smajax.report.sweep_plants import batch_part, differing
 
 Pictures = Mapping[str, tuple[bytes, bytes]]  # file name -> the picture, and the one for a telephone
 
@@ -49,25 +46,6 @@ NO_PLOTS: Mapping[str, SeriesPlot] = MappingProxyType({})
 NAMED = 3  # controllers of a headline
 
 
-def write_rows(path: Path, grid: Grid, sweep: ControllerSweep) -> None:
-    """Every closed loop in a row; angles in degrees, lengths in millimetres, an empty cell where a time is infinite."""
-    *ratios, target, gain = (axis.ravel() for axis in grid.axes())
-    ratios = ratios[: len(grid.mismatches)]
-    position = grid.plants.unit
-    inputs = np.stack([*ratios, position.of(target), gain], axis=1)
-    columns = [*grid.axis_names, f"set_point_{position.shown}", f"{sweep.main_gain}_ratio"]
-    units = {"°": "deg", "°C": "degC", "1/s": ""}  # a number per second says so by its name
-    merits = [f"{name}_{units.get(unit, unit)}".rstrip("_") for name, (_, unit, _) in shown_in(position).items()]
-    outputs = np.stack([merit_values(sweep.merits, name, position).ravel() for name in SHOWN], axis=1)
-    text = io.StringIO(newline="")
-    writer = csv.writer(text)
-    least, own = (np.broadcast_to(one.grid[..., None], grid.shape).ravel() for one in (sweep.least, sweep.own_least))
-    writer.writerow([*columns, *merits, "failed_at_s", "least_time_s", "least_time_own_limit_s"])
-    for before, after, *rest in zip(inputs, outputs, sweep.failed_at.ravel(), least, own, strict=True):
-        writer.writerow([f"{cell:.6g}" if np.isfinite(cell) else "" for cell in (*before, *after, *rest)])
-    replace(path, text.getvalue())
-
-
 def perturbed_sentence(grid: Grid, sweep: ControllerSweep) -> str:
     """The results of a controller on all the perturbed plants of the grid, in a sentence."""
     at = nominal_gain(grid)
@@ -82,7 +60,26 @@ def perturbed_sentence(grid: Grid, sweep: ControllerSweep) -> str:
     return (
         f"On all {grid_in_words(grid)} it settles in {100 * settled_share(grid, sweep):.0f} % of {runs} at "
         f"{grid.gains[at]:g} times its main gain{_soon(grid, sweep)}{_times_the_least(found)}; overshoot up to {overshoot:.3g}{unit.symbol}."
+        f"{_beyond_own_limit(grid, sweep)}"
     )
+
+
+def beyond_own_limit(grid: Grid, sweep: ControllerSweep) -> tuple[int, int]:
+    """(runs in reach in which it does not settle, those of them that its own largest command does not reach, though that of another controller does)."""
+    unsettled = ~np.isfinite(merit_values(sweep.merits, "settling_time")[..., nominal_gain(grid)])
+    failed = unsettled & np.isfinite(sweep.least.grid)
+    return int(failed.sum()), int((failed & np.isinf(sweep.own_least.grid)).sum())
+
+
+def _beyond_own_limit(grid: Grid, sweep: ControllerSweep) -> str:
+    failed, beyond = beyond_own_limit(grid, sweep)
+    if not beyond:
+        return ""
+    which = "The one run" if failed == 1 else f"Of the {failed} runs"
+    are = "is" if failed == 1 else f"in which it does not settle {beyond} are"
+    limit = f"{sweep.own_least.limit:.4g} {grid.plants.unit.command}"
+    rest = " in which it does not settle" if failed == 1 else ""
+    return f" {which}{rest} {are} out of reach of its own largest command, {limit}."
 
 
 def _soon(grid: Grid, sweep: ControllerSweep) -> str:
@@ -115,7 +112,9 @@ def _times_the_least(found: Distance | None) -> str:
 def grid_in_words(grid: Grid) -> str:
     """What differs between its plants."""
     return (
-        f"{len(grid.ratios)} plants of the batch" if grid.numbered else f"mismatches of {and_listed(grid.mismatches)}"
+        f"{counted(len(grid.ratios), 'plant')} of the batch"
+        if grid.numbered
+        else f"mismatches of {and_listed(grid.mismatches)}"
     )
 
 
@@ -174,6 +173,7 @@ def _controller_part(
         f"{say(description(sweep.name, results.unit))} {say(integration_sentence(sweep.integration_error))} "
         f'<a href="{sweep.name}.csv">every loop as CSV</a></p>'
         + _panels(pictures, f"{sweep.name}_maps.png", f"maps of {sweep.name}")
+        + (batch_part(results.grid, sweep) if results.grid.numbered else "")
         + lines
     )
 
@@ -234,7 +234,7 @@ def _drawn_as(grid: Grid) -> str:
         fewer = ", of those parameters on which they hang most" if len(grid.plants.columns) > ACROSS else ""
         return (
             "A point is a plant: median over the set points that it can reach, a ring the worst of them, over the value of each parameter"
-            f"{fewer}; dashed what the controller assumes"
+            f"{fewer}; dashed what the controller assumes. Below it the plants that the controller bears worst"
         )
     if grid.second:
         return "Maps: median over the set points that the plant can reach, and the worst of them beside it"
@@ -245,10 +245,9 @@ def _what_differs(results: SweepResults, drawn_as: str) -> str:
     """The head of the part on perturbed plants."""
     say, grid = html.escape, results.grid
     if grid.numbered:
-        names = ", ".join(grid.plants.columns)
         return (
-            f"<h2>Batch of {counted(len(grid.ratios), 'plant')}</h2><p>They differ in {say(names)}; the controller assumes the "
-            f"unperturbed plant. {drawn_as}, at the gain ratio nearest to 1.</p>"
+            f"<h2>Batch of {counted(len(grid.ratios), 'plant')}</h2><p>They differ in {say(differing(grid.plants))}. {drawn_as}, at the gain ratio "
+            "nearest to 1.</p>"
         )
     return (
         f"<h2>Mismatch of {say(and_listed(grid.mismatches))}</h2><p>The plant's value over the one that the "
@@ -309,6 +308,15 @@ class Ranked(NamedTuple):
     seconds: float  # median settling time, infinite where it never settles
     name: str
     overshoot: float  # the largest, in the unit shown
+    own_reach: float  # share of the runs in reach of its own largest command in which it settles; NaN where that is the reach of all
+    limit: float  # its own largest command
+
+
+def _own_reach(grid: Grid, sweep: ControllerSweep, settled: int) -> float:
+    """`Ranked.own_reach`."""
+    failed, beyond = beyond_own_limit(grid, sweep)
+    reached = settled + failed - beyond
+    return settled / reached if beyond and reached else float("nan")
 
 
 def ranked(results: SweepResults) -> list[Ranked]:
@@ -322,9 +330,11 @@ def ranked(results: SweepResults) -> list[Ranked]:
             Ranked(
                 np.inf if np.isnan(share) else 1.0 - share,
                 np.inf if found is None or np.isnan(found.median) else found.median,
-                float(np.median(times[settled])) if settled.any() else np.inf,
+                float(np.quantile(times[settled], 0.5, method="inverted_cdf")) if settled.any() else np.inf,
                 one.name,
                 float(np.nanmax(merit_values(one.merits, "overshoot", unit)[..., at])),
+                _own_reach(results.grid, one, int(settled.sum())),
+                one.own_least.limit,
             )
         )
     return sorted(rows)
@@ -336,19 +346,23 @@ def answer(results: SweepResults) -> str:
     def words(one: Ranked) -> str:
         if not np.isfinite(one.unsettled):
             return f"{one.name} has no set point within reach"
-        said = f"{one.name} settles in {100 * (1.0 - one.unsettled):.0f} %"
-        if not np.isfinite(one.seconds):
-            return said
-        unit, least = results.unit, ""
-        if np.isfinite(one.times_least):
-            least = f", {one.times_least:.3g} times the least time"
-        return (
-            f"{said} (after {one.seconds:.3g} s in the median{least}, overshoot up to {one.overshoot:.2g}{unit.symbol})"
-        )
+        more, unit = [], results.unit
+        if not np.isnan(one.own_reach):
+            more.append(f"{100 * one.own_reach:.0f} % of those that its own {one.limit:.3g} {unit.command} reach")
+        if np.isfinite(one.seconds):
+            least = f", {one.times_least:.3g} times the least time" if np.isfinite(one.times_least) else ""
+            more.append(
+                f"after {one.seconds:.3g} s in the median{least}, overshoot up to {one.overshoot:.2g}{unit.symbol}"
+            )
+        return f"{one.name} settles in {100 * (1.0 - one.unsettled):.0f} %" + (f" ({'; '.join(more)})" if more else "")
 
     each = [words(one) for one in ranked(results)]
     rest = f"; then {counted(len(each) - NAMED, 'other')}" if len(each) > NAMED else ""
-    plants = "plants drawn from the batch" if results.grid.numbered else "perturbed plants"
+    plants = (
+        f"the {counted(len(results.grid.ratios), 'plant')} of the batch"
+        if results.grid.numbered
+        else "perturbed plants"
+    )
     at = nominal_gain(results.grid)
     if any(
         found is not None and found.unreachable for found in (one.distance_at(at, one.least) for one in results.sweeps)

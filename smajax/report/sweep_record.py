@@ -41,11 +41,14 @@ def as_json(results: SweepResults, command: str = "", remarks: Remarks = NO_REMA
         "sweep": {
             "mismatches": list(grid.mismatches),
             **(
-                {"plants": dict(zip(grid.plants.columns, map(plain, batch.T), strict=True))}
+                {
+                    "plants": dict(zip(grid.plants.columns, map(plain, batch.T), strict=True)),
+                    "assumed": dict(zip(grid.plants.columns, plain(grid.plants.nominal), strict=True)),
+                    "units": dict(zip(grid.plants.columns, grid.plants.units, strict=True)),
+                }
                 if batch is not None
-                else {}
+                else {"ratios": plain(grid.ratios)}
             ),
-            "ratios": plain(grid.ratios),
             "maps": {one.name: map_numbers(grid, one) for one in results.sweeps},
             f"set_points_{own}": plain(grid.targets),
             "gain_ratios": plain(grid.gains),

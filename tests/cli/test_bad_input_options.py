@@ -217,7 +217,7 @@ LONG = {
     "sweep --controllers pid --over convection,damping,convection_coefficient": "for --over: `convection` twice",
     "sweep --controllers pid --over convection,,damping": "for --over: no mismatch ``",
     "sweep --controllers pid --over convection,damping,payload --points 3": "of a map, and 3 mismatches are on plants",
-    "sweep --controllers pid --over convection,damping,payload --plants 0": "for --plants: got 0 plants, expected at least one",
+    "sweep --controllers pid --over convection,damping,payload --plants 0": "for --plants: at least one, not 0",
     "sweep --set-points a": "finite numbers with commas between them, not `a`",
     "sweep --set-points nan": "finite numbers with commas between them, not `nan`",
     "sweep --set-points 400": "set points are angles between the arm's stops, -45 to 95 degrees",

@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
+import csv
+import html
 import json
+import re
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
+from matplotlib.figure import Figure
 
+from smajax.control.position_unit import DEGREES
 from smajax.control.sweep.spread_plants import spread_plants
 from smajax.core.parameters import parameter_values, set_parameters
 from smajax.model.rigs import arm
-from smajax.report.sweep_batch_picture import most_telling
+from smajax.report.sweep_batch_picture import draw_batch, most_telling
+from smajax.report.sweep_numbers import SHOWN
+from smajax.report.sweep_plants import hardest
 from tests.helpers.small_bench import smajax
 
 THREE = ("inertia", "damping", "convection")
@@ -38,8 +48,24 @@ def test_each_half_of_every_range_has_half_of_the_plants_in_every_combination() 
 def test_what_no_ratio_can_change_is_refused() -> None:
     with pytest.raises(ValueError, match=r"damping \(damping\) is 0 where the controller assumes it"):
         spread_plants(set_parameters(arm(), {"damping": 0.0}), THREE)
-    with pytest.raises(ValueError, match="no mismatch `wind`"):
-        spread_plants(arm(), ("wind",))
+    wrong: dict[str, Any]
+    for wrong, said in (
+        ({"mismatches": ("wind",)}, "no mismatch `wind`"),
+        ({"mismatches": "inertia"}, "expected several names"),
+        ({"mismatches": ("convection", "convection_coefficient")}, "`convection` twice"),
+        ({"count": 0}, "got 0 plants"),
+        ({"least": 0.0}, "from below 1 to above 1"),
+        ({"least": 0.5, "most": 0.9}, "from below 1 to above 1"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            spread_plants(arm(), **{"mismatches": THREE, **wrong})
+
+
+def test_fewer_plants_are_the_first_of_more_in_any_order_of_the_names() -> None:
+    many, few = spread_plants(arm(), THREE, 32), spread_plants(arm(), THREE[::-1], 10)
+    assert list(many) == list(few)
+    for name, values in few.items():
+        np.testing.assert_array_equal(values, many[name][:10])
 
 
 def test_the_parameters_drawn_are_those_on_which_the_figures_hang() -> None:
@@ -50,30 +76,103 @@ def test_the_parameters_drawn_are_those_on_which_the_figures_hang() -> None:
     assert most_telling(batch[:, :2], [never], 2) == [0, 1]
 
 
-def test_three_mismatches_at_once_are_a_batch_of_plants_with_a_picture_of_each(tmp_path: Path) -> None:
-    short = [
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Of a controller with a lower limit than the other, which does not reach a warm set point of a wire that is cooled twice as well."""
+    out = tmp_path_factory.mktemp("batch") / "sweep"
+    words = ["--plants", "8", "--set-point", "20,60", "--gain-ratios", "1", "--seconds", "4", "--tolerance", "none"]
+    told = smajax("sweep", "--controllers", "pid,sld", "--over", ",".join(THREE), *words, "--no-open", "--out", out)
+    assert told.code == 0, told.said
+    return out
+
+
+def test_three_mismatches_at_once_are_a_batch_of_plants_with_a_point_each(swept: Path) -> None:
+    record = json.loads((swept / "sweep.json").read_text(encoding="utf-8"))["sweep"]
+    names = ("inertia_ratio", "damping", "convection_coefficient")
+    assert {name: len(values) for name, values in record["plants"].items()} == dict.fromkeys(names, 8)
+    assert record["assumed"] == pytest.approx({name: parameter_values(arm())[name] for name in names})
+    assert record["units"]["damping"] == "N m s/rad"
+    assert record["loops"] == 16
+    page = (swept / "index.html").read_text(encoding="utf-8")
+    assert "Batch of 8 plants" in page
+    assert "the controller assumes 150)" in page
+    assert "A point is a plant" in page
+    assert (swept / "pid_maps.png").stat().st_size > 10_000
+
+
+def test_the_worst_plant_is_on_the_page_and_its_values_beside_every_loop(swept: Path) -> None:
+    with (swept / "pid.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    plants = json.loads((swept / "sweep.json").read_text(encoding="utf-8"))["sweep"]["plants"]
+    for row in rows:
+        assert float(row["damping"]) == pytest.approx(plants["damping"][int(row["plant"]) - 1], rel=1e-4)
+    loops = xr.load_dataset(swept / "sweep.nc")
+    np.testing.assert_allclose(loops["damping"], plants["damping"])
+    assert loops["damping"].dims == ("plant",)
+    # By the rows: most set points in reach at which it does not settle first, then the largest error.
+    unsettled = {plant: 0 for plant in range(1, 9)}
+    error = dict.fromkeys(unsettled, 0.0)
+    for row in rows:
+        if row["least_time_s"]:
+            unsettled[int(row["plant"])] += not row["settling_time_s"]
+            error[int(row["plant"])] = max(error[int(row["plant"])], float(row["steady_error_deg"]))
+    worst = max(unsettled, key=lambda plant: (unsettled[plant], error[plant]))
+    assert unsettled[worst] > 0
+    page = html.unescape((swept / "index.html").read_text(encoding="utf-8"))
+    table = page[page.index("does not settle at") :]
+    assert re.search(r"<td[^>]*>(\d+)</td>", table)[1] == str(worst)  # type: ignore[index]
+    assert f"--mismatch inertia_ratio={plants['inertia_ratio'][worst - 1]:.6g},damping=" in page
+
+
+def test_what_is_out_of_reach_of_the_controllers_own_limit_is_said(swept: Path) -> None:
+    with (swept / "sld.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    failed = [row for row in rows if row["least_time_s"] and not row["settling_time_s"]]
+    beyond = [row for row in failed if not row["least_time_own_limit_s"]]
+    assert beyond
+    page = (swept / "index.html").read_text(encoding="utf-8")
+    if len(failed) > 1:
+        said = f"Of the {len(failed)} runs in which it does not settle {len(beyond)} are out of reach of its own largest command, 8.7 V."
+    else:
+        said = "The one run in which it does not settle is out of reach of its own largest command, 8.7 V."
+    assert said in page
+    assert "of those that its own 8.7 V reach" in page
+
+
+def test_another_number_of_plants_is_named_in_the_folder(swept: Path) -> None:
+    told = smajax(
+        "sweep",
+        "--controllers",
+        "pid,sld",
+        "--over",
+        ",".join(THREE),
         "--plants",
-        "8",
+        "4",
         "--set-point",
         "20,60",
-        "--gain-ratios",
-        "1",
-        "--seconds",
-        "3",
-        "--tolerance",
-        "none",
-        "--no-open",
-    ]
-    told = smajax("sweep", "--controllers", "pid", "--over", ",".join(THREE), *short, "--out", tmp_path / "sweep")
-    assert told.code == 0, told.said
-    record = json.loads((tmp_path / "sweep" / "sweep.json").read_text(encoding="utf-8"))
-    assert {name: len(values) for name, values in record["sweep"]["plants"].items()} == {
-        "inertia_ratio": 8,
-        "damping": 8,
-        "convection_coefficient": 8,
-    }
-    assert record["sweep"]["loops"] == 16
-    page = (tmp_path / "sweep" / "index.html").read_text(encoding="utf-8")
-    assert "Batch of 8 plants" in page
-    assert "A point is a plant" in page
-    assert (tmp_path / "sweep" / "pid_maps.png").stat().st_size > 10_000
+        "--out",
+        swept,
+    )
+    assert told.code != 0
+    assert "8 over convection, damping, inertia, 0.5 to 2 times" in " ".join(told.said.split())
+
+
+def test_a_plant_in_reach_of_nothing_has_no_cross() -> None:
+    """And one that fails at some of its set points has another mark than one that fails at most of them."""
+    merits = {name: np.ones((4, 1, 3, 1)) for name in SHOWN}
+    merits["settling_time"][1, 0, :2] = np.inf  # most
+    merits["settling_time"][2, 0, 0] = np.inf  # some
+    merits["settling_time"][3] = np.inf
+    least = np.ones((4, 1, 3))
+    least[3] = np.inf  # none in reach
+    sweep: Any = SimpleNamespace(merits=SimpleNamespace(**merits), least=SimpleNamespace(grid=least))
+    batch = np.array([[1.0], [2.0], [3.0], [4.0]])
+    plants = SimpleNamespace(unit=DEGREES, batch=batch, columns=("damping",), units=("N m s/rad",), nominal=np.ones(1))
+    grid: Any = SimpleNamespace(ratios=np.arange(1.0, 5.0), gains=np.ones(1), plants=plants)
+    figure = Figure(figsize=(10.0, 14.0))
+    draw_batch(figure, grid, sweep)
+    marks = {line.get_label(): np.asarray(line.get_xdata()).tolist() for line in figure.axes[0].lines[1:]}
+    assert marks["never settles (arrives) at more than half"] == [2.0]
+    assert marks["never settles (arrives) at some"] == [3.0]
+    assert marks["no set point in reach"] == [4.0]
+    assert [one.plant for one in hardest(grid, sweep)] == [1, 2, 0]

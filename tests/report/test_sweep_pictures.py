@@ -26,7 +26,8 @@ def a_sweep(least: float) -> Any:
     merits["overshoot"][..., 1, :] += 2.0
     beyond = np.zeros((5, 5, 2))
     beyond[0, 0, 1] = np.inf  # out of reach: not counted
-    return SimpleNamespace(merits=SimpleNamespace(**merits), least=SimpleNamespace(grid=beyond))
+    least_times = SimpleNamespace(grid=beyond)
+    return SimpleNamespace(merits=SimpleNamespace(**merits), least=least_times, own_least=least_times)
 
 
 GRID: Any = SimpleNamespace(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -81,7 +81,7 @@ class _Options:
             return ()
         if "=" in self.over:
             raise typer.BadParameter(
-                f"names alone, as in `convection,damping`, not `{self.over}`: each goes from -50% to +100% in --points steps.",
+                f"names alone, as in `convection,damping`, not `{self.over}`: each goes from -50% to +100%, or as --ratios says.",
                 param_hint="--over",
             )
         names = tuple(short_name(part.strip()) for part in self.over.strip(" ,").split(","))
@@ -103,8 +103,24 @@ class _Options:
 
         replace(plant, drawn=None).plants(SEED, others=True, limit=limit)  # raises for --plant
         count = (SPREAD_FAST if self.fast else SPREAD) if plant.drawn is None else plant.drawn
-        with refused("--plants"):
+        if count < 1:
+            raise typer.BadParameter(f"at least one, not {count}.", param_hint="--plants")
+        with refused():
             return spread_plants(assumed, names, count, *self.ratio_range().values())
+
+    def plants_in_words(self, assumed: System, plants: Plants | None) -> str:
+        """What the record of a request says of plants: those of more than two mismatches are known by their number, names and range."""
+        import numpy as np
+
+        from smajax.control.sweep.grid import LEAST, MOST
+        from smajax.core.provenance import digest
+
+        names = self.mismatches(assumed)
+        if len(names) <= AXES or not isinstance(plants, Mapping):
+            return digest(plants)[:16]
+        least, most = self.ratio_range().values() or (LEAST, MOST)
+        count = np.size(next(iter(plants.values())))
+        return f"{count} over {', '.join(sorted(names))}, {least:g} to {most:g} times"
 
     def ratio_range(self) -> dict[str, float]:
         """`least` and `most` of --ratios, nothing without it. Raises typer.BadParameter."""
@@ -175,7 +191,7 @@ def sweep(
     over: Annotated[
         str | None,
         typer.Option(
-            help="the two mismatches of the maps, one of curves, or more, of which all differ at once on --plants plants; names alone: each goes from -50% to +100%; default convection,damping",
+            help="the two mismatches of the maps, one of curves, or more, of which all differ at once on --plants plants; names alone: each goes from -50% to +100%, or as --ratios says; default convection,damping",
             autocompletion=completion.mismatches,
         ),
     ] = None,
@@ -221,7 +237,10 @@ def sweep(
         ),
     ] = Path("sweep"),
     fast: Annotated[
-        bool, typer.Option("--fast", help="by default 3 x 3 mismatches, set points -20,20,60, gain 1")
+        bool,
+        typer.Option(
+            "--fast", help="by default 3 x 3 mismatches (16 plants of more than two), set points -20,20,60, gain 1"
+        ),
     ] = False,
     overwrite: Overwrite = False,
     json_out: Json = False,
@@ -300,7 +319,7 @@ def sweep(
     if not is_arm(assumed) or plant.law or plant.values or loop.command_limit is not None:
         request["plant"] = digest(assumed)[:16]
     if plants is not None:
-        request["plants"] = digest(plants)[:16]
+        request["plants"] = options.plants_in_words(assumed, plants)
     resume = "Finished controllers are cached: the same command resumes."
     try:
         with (
@@ -321,6 +340,7 @@ def sweep(
         typer.echo((out / "sweep.json").read_text(encoding="utf-8"), nl=False)
     else:
         typer.echo(answer(results))
+        typer.echo("On the unperturbed plant, median / worst over the set points:")
         typer.echo(as_text(results))
         for sentence in limit_sentences(results):
             typer.echo(sentence)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -44,6 +45,14 @@ def check_mismatches(names: Sequence[str], known: Sequence[str] = tuple(MISMATCH
     if twice or not names:
         got = f"`{twice[0]}` twice" if twice else "no mismatch"
         raise ValueError(f"{got}, expected one mismatch or different ones of {', '.join(known)}.")
+
+
+def check_ratios(least: float, most: float) -> None:
+    """Raise ValueError for a range of plant over model that does not go from below 1 to above 1."""
+    if not 0.0 < least < 1.0 < most < math.inf:
+        raise ValueError(
+            f"ratios of plant over model go from below 1 to above 1, such as 0.9 to 1.1; not {least:g} to {most:g}."
+        )
 
 
 def ratios_at(sides: np.ndarray, least: float = LEAST, most: float = MOST) -> np.ndarray:

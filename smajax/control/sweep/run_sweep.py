@@ -26,7 +26,7 @@ from smajax.control.reference import clock
 from smajax.control.scales import is_arm, seconds_for
 from smajax.control.signal_path import between_in_words, check_interface, check_set_points, default_noise, interface_of
 from smajax.control.sweep.batched_loops import LoopSetup, closed_loops, integrated_setup, positions
-from smajax.control.sweep.grid import LEAST, MOST, OF_ARM, PLANT, Grid, loop_rows, sweep_ratios
+from smajax.control.sweep.grid import LEAST, MOST, OF_ARM, PLANT, Grid, check_ratios, loop_rows, sweep_ratios
 from smajax.control.sweep.least_times import LeastTimes, least_times_of
 from smajax.core.files import json_line, writing
 from smajax.core.parameters import get_parameters, parameters, set_parameters
@@ -114,11 +114,7 @@ class SweepSettings:
             raise ValueError(
                 f"ratios of the main gain are numbers above 0, at least one; not {', '.join(map(str, self.gain_ratios))}."
             )
-        low, high = self.ratio_range
-        if not 0.0 < low < 1.0 < high < math.inf:
-            raise ValueError(
-                f"ratios of plant over model go from below 1 to above 1, such as 0.9 to 1.1; not {low:g} to {high:g}."
-            )
+        check_ratios(*self.ratio_range)
         check_interface(self.estimator, self.noise, self.period, self.dt, self.quantum)
         unused = [gains.controller for gains in self.tuned if gains.controller not in self.controllers]
         if unused:
