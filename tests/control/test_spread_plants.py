@@ -48,7 +48,6 @@ def test_each_half_of_every_range_has_half_of_the_plants_in_every_combination() 
 def test_what_no_ratio_can_change_is_refused() -> None:
     with pytest.raises(ValueError, match=r"damping \(damping\) is 0 where the controller assumes it"):
         spread_plants(set_parameters(arm(), {"damping": 0.0}), THREE)
-    wrong: dict[str, Any]
     for wrong, said in (
         ({"mismatches": ("wind",)}, "no mismatch `wind`"),
         ({"mismatches": "inertia"}, "expected several names"),
@@ -57,8 +56,9 @@ def test_what_no_ratio_can_change_is_refused() -> None:
         ({"least": 0.0}, "from below 1 to above 1"),
         ({"least": 0.5, "most": 0.9}, "from below 1 to above 1"),
     ):
+        given: dict[str, Any] = {"mismatches": THREE, **wrong}
         with pytest.raises(ValueError, match=said):
-            spread_plants(arm(), **{"mismatches": THREE, **wrong})
+            spread_plants(arm(), **given)
 
 
 def test_fewer_plants_are_the_first_of_more_in_any_order_of_the_names() -> None:
