@@ -18,12 +18,13 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 import numpy as np
 
 from smajax.attribution.detectable_effects import detectable
-from smajax.attribution.exclusive_effects import exclude_each_other, in_another_way, of_groups, replaceable
+from smajax.attribution.exclusive_effects import in_another_way, of_groups, replaceable
 from smajax.attribution.fitted_sets import JointRound, JointSearch
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model
 from smajax.attribution.program_fits import BegunFit
 from smajax.attribution.round_cache import Asked, key_of_round, loaded_round, save_round
 from smajax.attribution.set_starts import as_fitted_before, at_usual_size, starts
+from smajax.attribution.shape_starts import at_every_place
 from smajax.attribution.side_by_side import LOOSELY, fit_continued, fit_side_by_side, grouped_sets
 from smajax.attribution.subset_evidence import LinearModel, Subset, linear_model
 from smajax.attribution.traces import Traces, Variant, begin_traces, traces_at
@@ -83,7 +84,7 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
                 ended, present, error = [*ended, present], noted(search, present, other), search.error(other)
         search.joint = dataclasses.replace(search.joint, width_factors=present.width_factors)
         last = present.effects in checked
-        asked = _asked(search, present, error, _neighbours if last else _promising)
+        asked = asked_about(search, present, error, _neighbours if last else _promising)
         if asked.begun:
             fit_side_by_side(search, asked.begun, error, stage_of(search, number))
         best, before = search.best(error), present.log_evidence(error**2)
@@ -188,18 +189,18 @@ def _promising(search: JointSearch, linear: LinearModel, present: FittedModel, e
         effects = _effects(search, subset)
         if linear.log_evidence(subset) < least or len(sets) == FITTED:
             break
-        if effects != present.effects and _fresh(search, effects, error):
+        if effects != present.effects and is_fresh(search, effects, error):
             sets.setdefault(effects, subset)
     if not present.effects:
         single = {frozenset({one}) for subset in sets.values() for one in subset}
         alone: dict[tuple[str, ...], Subset] = {}
         for subset in sorted(single, key=lambda one: -linear.log_evidence(one)):
             alone.setdefault(_effects(search, subset), subset)
-        sets |= dict([(one, subset) for one, subset in alone.items() if _fresh(search, one, error)][:ALONE])
+        sets |= dict([(one, subset) for one, subset in alone.items() if is_fresh(search, one, error)][:ALONE])
     return list(sets.values())
 
 
-def _fresh(search: JointSearch, effects: tuple[str, ...], error: float) -> bool:
+def is_fresh(search: JointSearch, effects: tuple[str, ...], error: float) -> bool:
     """Whether a set was not yet fitted at about this error of a sample."""
     return abs(np.log(search.trials.get(effects, np.inf) / error)) > 2.0 * SETTLED
 
@@ -225,7 +226,7 @@ def _neighbours(search: JointSearch, linear: LinearModel, present: FittedModel, 
     near = likeliest(one for one in near if linear.log_evidence(one) > linear.log_evidence(here) - CERTAIN)
     alike = likeliest(here - {gone} | {one} for gone in here for one in others if replaceable(gone.effect, one.effect))
     near = _once(search, [*near[:NEIGHBOURS], *alike])
-    near = [one for one in near if _fresh(search, _effects(search, one), error)]
+    near = [one for one in near if is_fresh(search, _effects(search, one), error)]
     if error < UNEXPLAINED * search.noise or len(present.effects) >= MANY:
         return near
     beside = [one for one in with_one(here) if np.isfinite(linear.log_evidence(one))]
@@ -270,67 +271,7 @@ def _several_at_once(
     return best if best is not None and _gain(search, present, best) > SETTLED_ODDS else None
 
 
-def fitted_alone(search: JointSearch, effects: Sequence[str], error: float) -> list[FittedModel]:
-    """The base model with one of `effects` each, of those that the runs can show; `error` of an independent sample, SI."""
-    fresh = [effect for effect in effects if (effect,) not in search.fitted]
-    _fit_alone(search, fresh, error)
-    return _alone(search, effects)
-
-
-def likeliest_alone(search: JointSearch, effects: Sequence[str], found: FittedModel) -> list[FittedModel]:
-    """The base model with one of `effects` each that has come near to `found`, of the `NEIGHBOURS` that the linear model about the base model finds likeliest."""
-    error = search.error(found)
-    fresh = [effect for effect in effects if _fresh(search, (effect,), error)]
-    # One effect is owed what the coefficients of many cost, and no more than a model without any.
-    owed = found.cost_of_coefficients(error**2) - search.fitted[()].cost_of_coefficients(error**2)
-    _fit_alone(search, fresh, error, NEIGHBOURS, found.squares / error**2 + 2.0 * max(owed, 0.0))
-    return _alone(search, effects)
-
-
-def described_alone(search: JointSearch, found: FittedModel) -> list[FittedModel]:
-    """The base model with one effect each that describes what an effect of `found` describes (`exclude_each_other`), fitted to its end.
-
-    However far it is behind on the way: a second range of the transformation is far from linear, and a curve of it with five stand-ins came first.
-    """
-    error = search.error(found)
-    alike = [
-        name
-        for name in search.joint.coefficients
-        if name not in search.excluded and any(exclude_each_other((name, one)) for one in found.effects)
-    ]
-    _fit_alone(search, [name for name in alike if _fresh(search, (name,), error)], error, compared=False)
-    return _alone(search, alike)
-
-
-def _alone(search: JointSearch, effects: Sequence[str]) -> list[FittedModel]:
-    """The models of one of `effects` each that were fitted."""
-    return [search.fitted[effect,] for effect in effects if (effect,) in search.fitted]
-
-
-def _fit_alone(
-    search: JointSearch,
-    effects: Sequence[str],
-    error: float,
-    most: int | None = None,
-    least_cost: float = np.inf,
-    compared: bool = True,
-) -> None:
-    """Fit the base model with one of `effects` each, of those that the runs can show: the `most` likeliest in the linear model, None for all."""
-    shown = [effect for effect in effects if effect in search.detectable]
-    if not shown:
-        return
-
-    def alone(search: JointSearch, linear: LinearModel, present: FittedModel, error: float) -> list[Subset]:
-        places: dict[str, Variant] = {}
-        for one in sorted(linear.places, key=lambda one: -linear.log_evidence(frozenset({one}))):
-            places.setdefault(one.effect, one)
-        return [frozenset({one}) for effect, one in places.items() if effect in shown][:most]
-
-    begun = _asked(search, search.fitted[()], error, alone, shown, most).begun
-    fit_side_by_side(search, begun, error, stage_of(search, len(search.rounds)), compared, least_cost)
-
-
-def _asked(
+def asked_about(
     search: JointSearch,
     present: FittedModel,
     error: float,
@@ -389,5 +330,7 @@ def _begun(
                 usual = at_usual_size(joint, subset, traces, start)
                 begun += [BegunFit(effects, one, linear.width_factors) for one in usual]
                 before = as_fitted_before(joint, subset, traces, search.fitted.values(), error)
-                begun += [BegunFit(effects, one, linear.width_factors) for one in before]
+                far_off = traces.present and search.error_of(traces.present) > UNEXPLAINED * search.noise
+                places = at_every_place(joint, problem, index, subset, traces, start) if far_off else ()
+                begun += [BegunFit(effects, one, linear.width_factors) for one in (*before, *places)]
     return begun

@@ -14,10 +14,11 @@ import numpy as np
 from smajax.attribution.doubtful_runs import Left, left_without
 from smajax.attribution.exclusive_effects import replaceable
 from smajax.attribution.findings import Round
+from smajax.attribution.fits_alone import described_alone, fitted_alone, likeliest_alone
 from smajax.attribution.fitted_sets import JointRound, JointSearch
 from smajax.attribution.freed_presets import freed_at_the_base, freed_by_a_step, nearer_base, needs_presets
 from smajax.attribution.input_of_run import FAR_LESS
-from smajax.attribution.joint_search import MANY, described_alone, fitted_alone, likeliest_alone, search_jointly
+from smajax.attribution.joint_search import MANY, search_jointly
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model
 from smajax.attribution.model_fits import Evidence, Model, Search
 from smajax.attribution.nearest_alone import nearest_alone
@@ -213,12 +214,11 @@ class _Stage:
         return other or (self._one_of_all(search, found) if len(found.effects) >= MANY else None)
 
     def _one_of_all(self, search: JointSearch, found: FittedModel) -> FittedModel | None:
-        """The base model with one effect that is likelier than the many of `found`."""
+        """The base model, or one of few effects, with one more that is likelier than the many of `found`. Those that are fitted to their end come first: the others are not fitted again at this error."""
         every = [name for name in search.joint.coefficients if name not in search.excluded]
-        # First those that are fitted to their end: the others are not fitted again at this error.
         described = [] if leaves_noise(self.setting, found) else described_alone(search, found)
-        alone = nearest_alone(search, likeliest_alone(search, every, found), found)
-        likelier = self._likelier(search, found, [*described, *alone])
+        alone = nearest_alone(search, [*described, *likeliest_alone(search, every, found)], found)
+        likelier = self._likelier(search, found, alone)
         return likelier[0] if likelier else None
 
     def _asked(self, search: JointSearch, found: FittedModel) -> AskedFor:

@@ -26,13 +26,13 @@ def fit_side_by_side(
 ) -> None:
     """Fit sets of effects, those of one program side by side; the better of two fits of one set counts.
 
-    `compared`: those that fall far behind the others, or `least_cost` (of another model at this error), end early.
+    `compared`: those that fall far behind the others, or `least_cost` (of another model at this error), end early, and of several of one set all but the best.
     """
     joint = search.joint
     search.settings.progress(Stage(stage, 0.0))
     settings = dataclasses.replace(comparison_settings(search.settings, stage), least_cost=least_cost)
     if not compared:
-        settings = dataclasses.replace(settings, allowed_excess=(), promised_excess=None)
+        settings = dataclasses.replace(settings, allowed_excess=(), promised_excess=None, one_of_each=0)
     groups = [
         (program, [one for one in begun if one.effects in its_sets])
         for program, its_sets in grouped_sets(search, [one.effects for one in begun])

@@ -38,7 +38,11 @@ def written_beside(write: Callable[..., object], *arguments: Any) -> Iterator[Be
     last: list[Future[float] | Call[float]] = []
 
     def begin(known: Any, apart: bool = False) -> float:
-        took = _took(last[-1]) if last else 0.0
+        try:
+            took = _took(last[-1]) if last else 0.0
+        except Exception:
+            last.clear()  # it is raised once; a page that Ctrl-C interrupts the waiting for stays, and is written to its end
+            raise
         last.clear()
         page = partial(_timed, write, known, *arguments)
         if apart:

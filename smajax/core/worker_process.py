@@ -101,21 +101,24 @@ class Worker:
 
     def is_begun(self, key: Hashable) -> bool:
         """Whether a function is called, or waits for it."""
-        return key in self._called or key in self._waiting
+        with self._changed:  # between the two it is in neither
+            return key in self._called or key in self._waiting
 
     def is_idle(self) -> bool:
         """Whether nothing is called and nothing waits."""
         return not self._ended and not self._waiting and all(one.done() for one in tuple(self._called.values()))
 
     def taken(self, key: Hashable) -> tuple[Any] | None:
-        """(what a function returned,), for which this waits where it was called; None where it was not, or failed. It is then forgotten."""
+        """(what a function returned,), for which this waits where it was called; None where it was not, or failed. It is then forgotten, and not where the waiting is interrupted."""
         with self._changed:
             self._waiting.pop(key, None)
-            coming = self._called.pop(key, None)
+            coming = self._called.get(key)
+        answer = None
         if coming is not None:
             with suppress(Exception):
-                return (coming.result(),)
-        return None
+                answer = (coming.result(),)
+            self._called.pop(key, None)
+        return answer
 
     def close(self) -> None:
         """End the process, whatever it is at."""

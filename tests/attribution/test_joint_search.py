@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from smajax.attribution import fitted_sets, joint_search, side_by_side, subset_evidence, traces
+from smajax.attribution import fits_alone, fitted_sets, joint_search, side_by_side, subset_evidence, traces
 from smajax.attribution.detectable_effects import detectable
 from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.joint_parameters import JointParameters, residual_and_columns
@@ -121,7 +121,7 @@ def test_a_search_goes_on_from_what_is_named_before_its_end(monkeypatch: pytest.
     search = hot_weight({"latent_heat.enthalpy": 1.2e4})
 
     def named(found: FittedModel) -> FittedModel | None:
-        alone = joint_search.fitted_alone(search, ["latent_heat", "sensor_gain"], search.error(found))
+        alone = fits_alone.fitted_alone(search, ["latent_heat", "sensor_gain"], search.error(found))
         assert [one.effects for one in alone] == [("latent_heat",), ("sensor_gain",)]
         return None if found.effects else alone[0]
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from smajax.attribution import joint_search, side_by_side
+from smajax.attribution import fits_alone, side_by_side
 from smajax.attribution.fitted_sets import JointSearch
 from smajax.attribution.joint_search import search_jointly
 from smajax.attribution.laplace_evidence import fitted_model
@@ -115,7 +115,7 @@ def test_one_effect_alone_is_fitted_to_its_end_beside_many_that_leave_more() -> 
     for model in models_by_program(search.joint, begun, NOISE, comparison_settings(FitSettings(), "fitting"), 0):
         search.fitted[model.effects] = model
     search.detectable = CANDIDATES
-    alone = joint_search.likeliest_alone(search, CANDIDATES, search.fitted[others])
+    alone = fits_alone.likeliest_alone(search, CANDIDATES, search.fitted[others])
     (heat,) = [model for model in alone if model.effects == ("latent_heat",)]
     assert heat.rms < 1.05 * NOISE < search.fitted[others].rms
     assert heat.values[search.joint.slots["latent_heat.enthalpy"]] == pytest.approx(1.2e4, rel=0.02)

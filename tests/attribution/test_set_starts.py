@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from smajax.attribution.laplace_evidence import fitted_model
@@ -30,3 +32,39 @@ def test_a_shape_in_the_place_of_another_begins_as_it_was_fitted_before_too() ->
     assert not as_fitted_before(joint, subset, traces, [present], NOISE)  # it was not fitted before
     with_both = frozenset({Variant(old, -1), Variant(new, -1), Variant(beside, -1)})
     assert not as_fitted_before(joint, with_both, traces, [present, alone], NOISE)  # it replaces none
+
+
+def test_it_is_the_likeliest_fit_of_some_of_the_set_with_the_new_shape() -> None:
+    old, new, beside, other = "smooth_transformation", "two_part_transformation", "radiation", "latent_heat"
+    candidates = (old, new, beside, other)
+    search = hot_weight({}, candidates)
+    joint, slots = search.joint, search.joint.slots
+
+    def fitted(effects: tuple[str, ...], strain: float) -> Any:
+        values = joint.problem.start_values()
+        values[slots["recoverable_strain"]] *= strain
+        for effect, name in ((new, "heating_weight"), (beside, "emissivity"), (other, "enthalpy")):
+            if effect in effects:
+                values[slots[f"{effect}.{name}"]] = 1e-3
+        return fitted_model(joint, effects, values, candidates)
+
+    present = fitted((old, beside), 1.0)
+    traces = traces_at(joint, present, search.extent)
+    subset = frozenset({Variant(new, -1), Variant(beside, -1)})
+    near, far = fitted((new, beside), 1.01), fitted((new,), 1.2)
+    others = [
+        present,
+        fitted((beside,), 1.0),
+        fitted((new, other), 1.0),
+    ]  # without the shape, and with what is not in the set
+    for models in ([*others, near, far], [far, near, *others]):
+        (point,) = as_fitted_before(joint, subset, traces, models, NOISE)
+        assert point[slots["recoverable_strain"]] == near.values[slots["recoverable_strain"]]
+    # A sensor's lag may stand in the place of a late input, which is no other shape of the same.
+    alike = hot_weight({}, ("input_delay", "sensor_lag"))
+    late = fitted_model(
+        alike.joint, ("input_delay",), alike.joint.problem.start_values(), ("input_delay", "sensor_lag")
+    )
+    lag = fitted_model(alike.joint, ("sensor_lag",), alike.joint.problem.start_values(), ("input_delay", "sensor_lag"))
+    its_traces = traces_at(alike.joint, late, alike.extent)
+    assert as_fitted_before(alike.joint, frozenset({Variant("sensor_lag", -1)}), its_traces, [late, lag], NOISE) == []

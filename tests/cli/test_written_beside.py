@@ -54,6 +54,22 @@ def test_what_cannot_be_written_is_raised_at_the_next_page_but_not_at_the_end() 
     _pages(write, "first")
 
 
+def test_what_cannot_be_written_is_raised_once() -> None:
+    written = []
+
+    def write(page: str) -> None:
+        if page == "first":
+            raise OSError(page)
+        written.append(page)
+
+    with written_beside(write) as begin:
+        begin("first")
+        with pytest.raises(OSError, match="first"):
+            begin("second")
+        begin("third")
+    assert written == ["third"]
+
+
 def test_how_long_the_page_before_took_is_said() -> None:
     with written_beside(lambda _: time.sleep(0.05)) as begin:
         assert begin("first") == 0.0

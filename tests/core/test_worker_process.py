@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from concurrent.futures import Future
 from functools import partial
 from pathlib import Path
 
@@ -71,6 +72,25 @@ def test_what_was_not_called_yet_is_called_here_and_not_there(started: module.Wo
     begin("next", os.getpid, ())
     wait_for("next")
     assert taken("next") == (started._process.pid,)
+
+
+def test_what_was_called_is_not_forgotten_where_the_waiting_for_it_is_interrupted(
+    started: module.Worker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begin("slow", os.getpid, ())
+    wait_for("slow")
+
+    class Interrupted(Future[int]):
+        def result(self, timeout: float | None = None) -> int:
+            raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setitem(started._called, "slow", Interrupted())
+        with pytest.raises(KeyboardInterrupt):
+            taken("slow")
+        assert is_called("slow")
+    assert taken("slow") == (started._process.pid,)
+    assert not is_called("slow")
 
 
 def test_whether_it_has_anything_to_do_is_said(started: module.Worker) -> None:
