@@ -329,7 +329,7 @@ def _begun(
                 # And, where an effect is new, from its usual size: near zero the misfit may have a minimum of its own.
                 usual = at_usual_size(joint, subset, traces, start)
                 begun += [BegunFit(effects, one, linear.width_factors) for one in usual]
-                before = as_fitted_before(joint, subset, traces, search.fitted.values(), error)
+                before = as_fitted_before(joint, subset, traces, start, search.fitted.values(), error)
                 far_off = traces.present and search.error_of(traces.present) > UNEXPLAINED * search.noise
                 places = at_every_place(joint, problem, index, subset, traces, start) if far_off else ()
                 begun += [BegunFit(effects, one, linear.width_factors) for one in (*before, *places)]

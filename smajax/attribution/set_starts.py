@@ -68,9 +68,14 @@ def at_usual_size(joint: JointParameters, subset: Subset, traces: Traces, start:
 
 
 def as_fitted_before(
-    joint: JointParameters, subset: Subset, traces: Traces, fitted: Iterable[FittedModel], error: float
+    joint: JointParameters,
+    subset: Subset,
+    traces: Traces,
+    start: np.ndarray,
+    fitted: Iterable[FittedModel],
+    error: float,
 ) -> list[np.ndarray]:
-    """Where a set with a new effect in the place of one that it excludes begins as well, (P,): at the likeliest of the `fitted` models with the new one and some of the set, and the others of the set as they are.
+    """Where a set with a new effect in the place of one that it excludes begins as well, (P,): at the likeliest of the `fitted` models with the new one and some of the set, and the others of the set as at `start` (P,).
 
     With another shape of the transformation its temperatures are others, far from those of the present fit. `error` of an independent sample, SI.
     """
@@ -83,8 +88,8 @@ def as_fitted_before(
             continue
         values = np.array(best.values)
         others = [joint.slots[name] for effect in effects - set(best.effects) for name in joint.coefficients[effect]]
-        values[others] = traces.values[others]
-        points.append(values)
+        values[others] = start[others]
+        points.append(_off_bounds(joint, values))
     return points
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -229,7 +230,9 @@ def _runs(findings: Findings) -> list[dict[str, Any]]:
     many = len(plots) > MANY
     # Drawing takes seconds, in which the search would stand still: what unfinished pages show without it is enough for them.
     drawn = findings.remaining is not Remaining.SEARCH
-    asked = [(findings, run, _hysteresis_dpi(number, many)) for number, run in enumerate(findings.runs)]
+    # Each goes to another process with what it draws: without the other runs.
+    rest = dataclasses.replace(findings, runs=())
+    asked = [(rest, run, _hysteresis_dpi(number, many)) for number, run in enumerate(findings.runs)]
     drawings = drawn_pictures([(pictures.run_hysteresis, one) for one in asked]) if drawn else [None] * len(asked)
     return [
         {

@@ -14,24 +14,29 @@ from tests.helpers.hot_weight import NOISE, UNKNOWNS, hot_weight
 
 def test_a_shape_in_the_place_of_another_begins_as_it_was_fitted_before_too() -> None:
     """The temperatures of a wire with the one are not those with the other."""
-    old, new, beside = "smooth_transformation", "two_part_transformation", "radiation"
-    search = hot_weight({}, (old, new, beside))
+    old, new, beside, more = "smooth_transformation", "two_part_transformation", "radiation", "latent_heat"
+    search = hot_weight({}, (old, new, beside, more))
     joint, slots = search.joint, search.joint.slots
     here, there = joint.problem.start_values(), joint.problem.start_values()
     here[slots[f"{old}.weight"]], here[slots[f"{beside}.emissivity"]] = 1.0, 0.4
     there[slots[UNKNOWNS[0]]] *= 1.1
     there[slots[f"{new}.heating_weight"]] = 0.6
-    present = fitted_model(joint, (old, beside), here, (old, new, beside))
-    alone = fitted_model(joint, (new,), there, (old, new, beside))
+    there[slots[UNKNOWNS[1]]] = high = joint.bounds[UNKNOWNS[1]][1]
+    present = fitted_model(joint, (old, beside), here, (old, new, beside, more))
+    alone = fitted_model(joint, (new,), there, (old, new, beside, more))
     traces = traces_at(joint, present, search.extent)
-    subset = frozenset({Variant(new, -1), Variant(beside, -1)})
-    (point,) = as_fitted_before(joint, subset, traces, [present, alone], NOISE)
+    subset = frozenset({Variant(new, -1), Variant(beside, -1), Variant(more, -1)})
+    start = np.array(here)
+    start[slots[f"{more}.enthalpy"]] = 5e3  # what else is new, by the linear model
+    (point,) = as_fitted_before(joint, subset, traces, start, [present, alone], NOISE)
     assert point[slots[f"{beside}.emissivity"]] == 0.4
-    point[slots[f"{beside}.emissivity"]] = there[slots[f"{beside}.emissivity"]]
-    np.testing.assert_array_equal(point, there)
-    assert not as_fitted_before(joint, subset, traces, [present], NOISE)  # it was not fitted before
+    assert point[slots[f"{more}.enthalpy"]] == 5e3
+    assert 0.99 * high < point[slots[UNKNOWNS[1]]] < high  # what begins on its bound stays there
+    rest = [k for name, k in slots.items() if not name.startswith((beside, more)) and name != UNKNOWNS[1]]
+    np.testing.assert_array_equal(point[rest], there[rest])
+    assert not as_fitted_before(joint, subset, traces, start, [present], NOISE)  # it was not fitted before
     with_both = frozenset({Variant(old, -1), Variant(new, -1), Variant(beside, -1)})
-    assert not as_fitted_before(joint, with_both, traces, [present, alone], NOISE)  # it replaces none
+    assert not as_fitted_before(joint, with_both, traces, start, [present, alone], NOISE)  # it replaces none
 
 
 def test_it_is_the_likeliest_fit_of_some_of_the_set_with_the_new_shape() -> None:
@@ -58,7 +63,7 @@ def test_it_is_the_likeliest_fit_of_some_of_the_set_with_the_new_shape() -> None
         fitted((new, other), 1.0),
     ]  # without the shape, and with what is not in the set
     for models in ([*others, near, far], [far, near, *others]):
-        (point,) = as_fitted_before(joint, subset, traces, models, NOISE)
+        (point,) = as_fitted_before(joint, subset, traces, present.values, models, NOISE)
         assert point[slots["recoverable_strain"]] == near.values[slots["recoverable_strain"]]
     # A sensor's lag may stand in the place of a late input, which is no other shape of the same.
     alike = hot_weight({}, ("input_delay", "sensor_lag"))
@@ -67,4 +72,9 @@ def test_it_is_the_likeliest_fit_of_some_of_the_set_with_the_new_shape() -> None
     )
     lag = fitted_model(alike.joint, ("sensor_lag",), alike.joint.problem.start_values(), ("input_delay", "sensor_lag"))
     its_traces = traces_at(alike.joint, late, alike.extent)
-    assert as_fitted_before(alike.joint, frozenset({Variant("sensor_lag", -1)}), its_traces, [late, lag], NOISE) == []
+    assert (
+        as_fitted_before(
+            alike.joint, frozenset({Variant("sensor_lag", -1)}), its_traces, late.values, [late, lag], NOISE
+        )
+        == []
+    )
