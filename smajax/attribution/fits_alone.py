@@ -8,7 +8,7 @@ import numpy as np
 
 from smajax.attribution.exclusive_effects import exclude_each_other, of_groups
 from smajax.attribution.fitted_sets import JointSearch
-from smajax.attribution.joint_search import MANY, NEIGHBOURS, asked_about, is_fresh, stage_of
+from smajax.attribution.joint_search import NEIGHBOURS, asked_about, is_fresh, stage_of
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.side_by_side import fit_side_by_side
 from smajax.attribution.subset_evidence import LinearModel, Subset
@@ -33,7 +33,7 @@ def likeliest_alone(search: JointSearch, effects: Sequence[str], found: FittedMo
 
 
 def described_alone(search: JointSearch, found: FittedModel) -> list[FittedModel]:
-    """The base model, and the likeliest fit of a few effects of `found`, with one effect more each that describes what an effect of `found` describes (`exclude_each_other`), fitted to its end.
+    """The base model, and the likeliest fit of another effect of `found` alone, with one effect more each that describes what an effect of `found` describes (`exclude_each_other`), fitted to its end.
 
     However far it is behind on the way: a second range of the transformation is far from linear, and a curve of it with five stand-ins came first. What else is
     missing has to be there: without the contrast of the resistances that was, the second range left as much as nothing.
@@ -46,8 +46,8 @@ def described_alone(search: JointSearch, found: FittedModel) -> list[FittedModel
         if name not in search.excluded and any(exclude_each_other((name, one)) for one in described)
     ]
     rest = set(found.effects) - described
-    few = [one for one in search.fitted.values() if 0 < len(one.effects) < MANY and rest.issuperset(one.effects)]
-    likeliest = max(few, key=lambda one: one.log_evidence(error**2), default=None)
+    single = [one for one in search.fitted.values() if len(one.effects) == 1 and rest.issuperset(one.effects)]
+    likeliest = max(single, key=lambda one: one.log_evidence(error**2), default=None)
     models = []
     for beside in [(), *([] if likeliest is None else [likeliest.effects])]:
         sets = {name: search.joint.ordered((*beside, name)) for name in alike}

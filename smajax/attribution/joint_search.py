@@ -316,6 +316,8 @@ def _begun(
         return []
     joint = dataclasses.replace(search.joint, width_factors={**search.joint.width_factors, **linear.width_factors})
     begun: list[BegunFit] = []
+    # About the base model the places of a shape are in the linear model, and their fits would be those of every search.
+    far_off = traces.present and search.error_of(traces.present) > UNEXPLAINED * search.noise
     groups = grouped_sets(search, [_effects(search, subset) for subset in sets])
     restricted = [joint.restricted(program) for program, _ in groups]
     made_ready([problem for problem, _ in restricted])
@@ -330,7 +332,6 @@ def _begun(
                 usual = at_usual_size(joint, subset, traces, start)
                 begun += [BegunFit(effects, one, linear.width_factors) for one in usual]
                 before = as_fitted_before(joint, subset, traces, start, search.fitted.values(), error)
-                far_off = traces.present and search.error_of(traces.present) > UNEXPLAINED * search.noise
-                places = at_every_place(joint, problem, index, subset, traces, start) if far_off else ()
+                places = at_every_place(joint, subset, traces, start) if far_off else ()
                 begun += [BegunFit(effects, one, linear.width_factors) for one in (*before, *places)]
     return begun

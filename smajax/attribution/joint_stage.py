@@ -53,8 +53,7 @@ class _Stage:
     excluded: set[str] = field(default_factory=set)
     asked: list[AskedFor] = field(default_factory=list)  # unknown terms beside the base model, once they were asked for
     asking: Asking | None = None  # what a second process may be fitting for that
-    # Kinds of search (`thorough`) in which it was asked for a wrong record of a run, or is not to be.
-    asked_for_records: set[bool] = field(default_factory=set)
+    asked_for_records: set[bool] = field(default_factory=set)  # searches (`thorough`) that ask for no wrong record
 
     def joint_search(self, presets: Mapping[str, CoefficientPrior]) -> JointSearch:
         """Among the candidates that were not excluded."""
@@ -217,9 +216,10 @@ class _Stage:
         """The base model, or one of few effects, with one more that is likelier than the many of `found`. Those that are fitted to their end come first: the others are not fitted again at this error."""
         every = [name for name in search.joint.coefficients if name not in search.excluded]
         described = [] if leaves_noise(self.setting, found) else described_alone(search, found)
-        alone = nearest_alone(search, [*described, *likeliest_alone(search, every, found)], found)
-        likelier = self._likelier(search, found, alone)
-        return likelier[0] if likelier else None
+        known = {one.effects for one in described}
+        others = [one for one in likeliest_alone(search, every, found) if one.effects not in known]
+        near = nearest_alone(search, described, found) + nearest_alone(search, others, found)
+        return next(iter(self._likelier(search, found, near)), None)
 
     def _asked(self, search: JointSearch, found: FittedModel) -> AskedFor:
         """Unknown functions beside the base model, whose values of presets are free in them as well. `found`: the likeliest model, beside which they may be asked for when the search has ended."""

@@ -15,7 +15,7 @@ from smajax.attribution.traces import Traces
 from smajax.fit.problem import Problem
 from smajax.model.effects.library import LIBRARY
 from smajax.model.system import System
-from smajax.model.wire.kinetics import austenite_left, martensite_left
+from smajax.model.wire.kinetics import NARROWEST_RANGE, austenite_left, martensite_left
 from smajax.model.wire.kinetics_terms import KineticsTerms
 
 HEATING = ("austenite_start", "austenite_finish")
@@ -25,15 +25,14 @@ POINTS = 2001
 AROUND = 4.0  # ranges on either side
 
 
-def at_every_place(
-    joint: JointParameters, problem: Problem, index: np.ndarray, subset: Subset, traces: Traces, start: np.ndarray
-) -> Iterator[np.ndarray]:
+def at_every_place(joint: JointParameters, subset: Subset, traces: Traces, start: np.ndarray) -> Iterator[np.ndarray]:
     """`start` (P,) with a new shape of the transformation at its usual size at each of its places (`Candidate.grid`), its temperatures as in `keeping_the_range`.
 
     Where the fit without the shape is far off, neither its derivatives nor the misfit at a place say at which one it belongs. A second range of two fifths of a
     wire ended at 3.5 noises from the one that the linear model had chosen, and at the noise from three of the four with these temperatures.
-    `problem`, `index`: of a program that has the effects of the set.
     """
+    # With what the present model has as well: a shape that goes is in the range that is kept.
+    problem, index = joint.restricted(joint.ordered(tuple({*traces.present, *(one.effect for one in subset)})))
     for variant in subset:
         if variant.effect in traces.present or not LIBRARY[variant.effect].candidate.exclusive_group:
             continue
@@ -53,7 +52,7 @@ def at_every_place(
 def keeping_the_range(
     joint: JointParameters, problem: Problem, index: np.ndarray, before: np.ndarray, values: np.ndarray
 ) -> np.ndarray:
-    """`values` (P,) with the transformation temperatures at which nine and one tenth of the wire are yet to transform where they are at `before`, on heating and on cooling; as they are where one is not free.
+    """`values` (P,) with the transformation temperatures at which nine and one tenth of the wire are yet to transform where they are at `before`, on heating and on cooling; as they are where one is not free, or a range is that of nothing. `problem`, `index`: of a program that has the effects of both.
 
     A shape counts its distance in ranges, z = (y - A_s)/(A_f - A_s), so that another one with the same four temperatures transforms elsewhere.
     """
@@ -63,12 +62,14 @@ def keeping_the_range(
     for branch, names in enumerate((HEATING, COOLING)):
         slots = [joint.slots[name] for name in names]
         (low, high), ends = before[slots], values[slots]
+        if min(high - low, ends[1] - ends[0]) < NARROWEST_RANGE:
+            continue
         width = max(high - low, ends[1] - ends[0])
         grid = np.linspace(min(low, ends[0]) - AROUND * width, max(high, ends[1]) + AROUND * width, POINTS)
         there, here = (_reached(problem.system_at(jnp.asarray(one[index])), grid, branch) for one in (before, values))
         # In ranges of the new shape, from its own start.
         z = (here - ends[0]) / (ends[1] - ends[0])
-        range_now = (there[1] - there[0]) / (z[1] - z[0]) if z[1] != z[0] else np.nan
+        range_now = (there[1] - there[0]) / (z[1] - z[0]) if z[1] > z[0] else np.nan
         begin = there[0] - z[0] * range_now
         if np.isfinite(range_now) and range_now > 0.0:
             for slot, name, value in zip(slots, names, (begin, begin + range_now), strict=True):
@@ -79,11 +80,12 @@ def keeping_the_range(
 
 
 def _reached(system: System, grid: np.ndarray, branch: int) -> np.ndarray:
-    """Temperatures (2,) in degC, without stress, at which `LEFT` is yet to transform; branch: 0 on heating, 1 on cooling."""
+    """Temperatures (2,) in degC, without stress, at which `LEFT` is yet to transform, NaN where that is beyond the grid; branch: 0 on heating, 1 on cooling."""
     left = np.asarray(_left(system, jnp.asarray(grid))[branch])
     # On cooling the temperature rises as less has transformed.
     order = slice(None, None, -1) if branch == 0 else slice(None)
-    return np.interp(LEFT if branch == 0 else LEFT[::-1], left[order], grid[order])
+    levels = LEFT if branch == 0 else LEFT[::-1]
+    return np.interp(levels, left[order], grid[order], left=np.nan, right=np.nan)
 
 
 @eqx.filter_jit

@@ -9,6 +9,8 @@ import pytest
 
 from smajax.attribution import fits_alone
 from smajax.attribution.fits_alone import described_alone
+from smajax.attribution.joint_search import search_jointly
+from tests.helpers.hot_weight import hot_weight
 
 NAMES = ("latent_heat", "smooth_transformation", "two_part_transformation", "transformation_curve", "radiation")
 
@@ -56,13 +58,31 @@ def test_the_shapes_of_the_transformation_are_fitted_alone_beside_one_of_them(as
     assert asked == [(["transformation_curve"], {"compared": False, "beside": ()})]
 
 
-def test_they_are_fitted_beside_the_likeliest_few_of_the_others_too(asked: list[Any]) -> None:
-    """Not beside another shape, what was not found, or many."""
+def test_they_are_fitted_beside_the_likeliest_other_effect_too(asked: list[Any]) -> None:
+    """Not beside another shape, what was not found, or two: with three effects these would be the rest of what was found."""
     heat, both = model("latent_heat", evidence=3.0), model("latent_heat", "transformation_curve", evidence=9.0)
-    others = (model("radiation", evidence=1.0), model("two_part_transformation", evidence=8.0), both)
+    others = (
+        model("latent_heat", "radiation", evidence=8.5),
+        model("radiation", evidence=1.0),
+        model("two_part_transformation", evidence=8.0),
+        both,
+    )
     search = search_of(model(), heat, *others, model("sensor_gain", evidence=7.0))
     models = described_alone(
         search, cast(Any, SimpleNamespace(effects=("latent_heat", "radiation", "transformation_curve")))
     )
     assert [how["beside"] for _, how in asked] == [(), ("latent_heat",)]
     assert [one.effects for one in models] == [("two_part_transformation",), ("latent_heat", "transformation_curve")]
+
+
+def test_a_fit_beside_an_effect_begins_with_that_effect() -> None:
+    search = hot_weight({"latent_heat.enthalpy": 1.2e4, "phase_resistance.contrast": 0.2})
+    found = search_jointly(search, {(): search.joint.problem.start_values()})
+    assert set(found.effects) == {"latent_heat", "phase_resistance"}
+    both = search.joint.ordered(found.effects)
+    heat = search.fitted.get(("latent_heat",)) or fits_alone.fitted_alone(search, ["latent_heat"], search.noise)[0]
+    del search.fitted[both]
+    fits_alone._fit_alone(search, ["phase_resistance"], search.noise, beside=heat.effects)
+    again = search.fitted[both]
+    assert again.rms == pytest.approx(found.rms, rel=0.01)
+    assert again.values[search.joint.slots["latent_heat.enthalpy"]] == pytest.approx(1.2e4, rel=0.1)

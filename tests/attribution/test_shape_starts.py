@@ -90,11 +90,10 @@ def test_a_new_shape_begins_at_each_of_its_places_at_its_usual_size(search: Join
     traces = traces_at(joint, fitted_model(joint, (BESIDE,), here, (NEW, BESIDE)), search.extent)
     start = np.array(here)
     start[slots[UNKNOWNS[0]]] = 170.0  # moved along what the linear model says
-    problem, index = joint.restricted((NEW, BESIDE))
 
     def points(*effects: str) -> list[np.ndarray]:
         subset = frozenset(Variant(effect, -1) for effect in effects)
-        return list(at_every_place(joint, problem, index, subset, traces, start))
+        return list(at_every_place(joint, subset, traces, start))
 
     shifts = [slots[f"{NEW}.{name}"] for name in ("heating_shift", "cooling_shift")]
     found = points(BESIDE, NEW)
@@ -105,6 +104,32 @@ def test_a_new_shape_begins_at_each_of_its_places_at_its_usual_size(search: Join
         assert one[slots[f"{BESIDE}.emissivity"]] == 0.4
     assert points(BESIDE) == []
     assert points(BESIDE, "smooth_transformation") == []  # which has no places
+
+
+def test_the_range_of_a_shape_that_goes_is_kept(search: JointSearch) -> None:
+    """A program of the new set alone does not have it."""
+    old, candidates = "smooth_transformation", (NEW, "smooth_transformation")
+    joint, slots = search.joint, search.joint.slots
+    here = joint.problem.start_values()
+    here[slots[f"{old}.weight"]] = 0.6
+    traces = traces_at(joint, fitted_model(joint, (old,), here, candidates), search.extent)
+    several = list(at_every_place(joint, frozenset({Variant(NEW, -1)}), traces, here))
+    assert len(several) == 4
+    wide, narrow = joint.restricted(candidates), joint.restricted((NEW,))
+    for one in several:
+        own = np.array(one)
+        own[[slots[name] for name in TEMPERATURES]] = here[[slots[name] for name in TEMPERATURES]]
+        np.testing.assert_array_equal(one, keeping_the_range(joint, *wide, here, own))
+        assert (one != keeping_the_range(joint, *narrow, here, own)).any()
+
+
+def test_a_range_of_nothing_and_one_beyond_the_grid_stay(search: JointSearch) -> None:
+    joint, slots = search.joint, search.joint.slots
+    before, values = joint.problem.start_values(), joint.problem.start_values()
+    problem, index = joint.restricted((NEW, BESIDE))
+    before[slots["austenite_finish"]] = before[slots["austenite_start"]]
+    values[slots[f"{NEW}.cooling_weight"]], values[slots[f"{NEW}.width"]] = 0.8, 25.0
+    np.testing.assert_array_equal(keeping_the_range(joint, problem, index, before, values), values)
 
 
 @pytest.mark.parametrize("far_off", [True, False])
