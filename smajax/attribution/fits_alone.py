@@ -39,7 +39,7 @@ def described_alone(search: JointSearch, found: FittedModel) -> list[FittedModel
     missing has to be there: without the contrast of the resistances that was, the second range left as much as nothing.
     """
     error = search.error(found)
-    described = {one for one in found.effects if of_groups((one,))}
+    described = set(of_groups(found.effects))
     alike = [
         name
         for name in search.joint.coefficients

@@ -1,4 +1,4 @@
-"""Single effects that come near to a model of many effects, fitted to their ends."""
+"""Models of one or two effects that come near to one of many, fitted to their ends."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MOST_TIMES = 3
 
 
 def nearest_alone(search: JointSearch, alone: Sequence[FittedModel], found: FittedModel) -> list[FittedModel]:
-    """`alone`, the base model with one effect each, of which the nearest to `found` are fitted on.
+    """`alone`, models of one effect or two, of which the nearest to `found` are fitted on.
 
     A fit beside others ends after some steps, where most have converged. Of a play of the sensor that was 15 % of the stroke it took twice as many:
     half-way it left 1.7 noises, and six effects that left 1.2 were likelier.

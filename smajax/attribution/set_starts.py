@@ -41,7 +41,7 @@ def starts(joint: JointParameters, subset: Subset, linear: LinearModel, traces: 
         points += _elsewhere(joint, variant.effect, moved)
     taken_over = _in_the_place_of(joint, subset, traces, moved)
     points += [] if taken_over is None else [taken_over]
-    return [_off_bounds(joint, one) for one in points]
+    return [off_bounds(joint, one) for one in points]
 
 
 def at_usual_size(joint: JointParameters, subset: Subset, traces: Traces, start: np.ndarray) -> list[np.ndarray]:
@@ -89,7 +89,7 @@ def as_fitted_before(
         values = np.array(best.values)
         others = [joint.slots[name] for effect in effects - set(best.effects) for name in joint.coefficients[effect]]
         values[others] = start[others]
-        points.append(_off_bounds(joint, values))
+        points.append(off_bounds(joint, values))
     return points
 
 
@@ -154,7 +154,7 @@ def _elsewhere(joint: JointParameters, effect: str, values: np.ndarray) -> list[
     return points
 
 
-def _off_bounds(joint: JointParameters, values: np.ndarray) -> np.ndarray:
+def off_bounds(joint: JointParameters, values: np.ndarray) -> np.ndarray:
     """A parameter that begins on its bound stays there."""
     changed = np.array(values)
     for name in joint.unknowns:

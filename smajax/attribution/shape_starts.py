@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.joint_parameters import JointParameters
+from smajax.attribution.set_starts import off_bounds
 from smajax.attribution.subset_evidence import Subset
 from smajax.attribution.traces import Traces
 from smajax.fit.problem import Problem
@@ -33,6 +34,7 @@ def at_every_place(joint: JointParameters, subset: Subset, traces: Traces, start
     """
     # With what the present model has as well: a shape that goes is in the range that is kept.
     problem, index = joint.restricted(joint.ordered(tuple({*traces.present, *(one.effect for one in subset)})))
+    own = [joint.slots[name] for name in joint.unknowns]
     for variant in subset:
         if variant.effect in traces.present or not LIBRARY[variant.effect].candidate.exclusive_group:
             continue
@@ -42,8 +44,7 @@ def at_every_place(joint: JointParameters, subset: Subset, traces: Traces, start
             if other.effect != variant.effect:
                 continue
             values = np.array(start)
-            for name in joint.unknowns:
-                values[joint.slots[name]] = traces.values[joint.slots[name]]
+            values[own] = traces.values[own]
             for name, value in {**place, **usual}.items():
                 values[joint.slots[name]] = np.clip(value, *joint.bounds[name])
             yield keeping_the_range(joint, problem, index, traces.values, values)
@@ -72,11 +73,8 @@ def keeping_the_range(
         range_now = (there[1] - there[0]) / (z[1] - z[0]) if z[1] > z[0] else np.nan
         begin = there[0] - z[0] * range_now
         if np.isfinite(range_now) and range_now > 0.0:
-            for slot, name, value in zip(slots, names, (begin, begin + range_now), strict=True):
-                bounds = joint.bounds[name]
-                room = 1e-3 * (bounds[1] - bounds[0])  # a parameter that begins on its bound stays there
-                changed[slot] = np.clip(value, bounds[0] + room, bounds[1] - room)
-    return changed
+            changed[slots] = begin, begin + range_now
+    return off_bounds(joint, changed)
 
 
 def _reached(system: System, grid: np.ndarray, branch: int) -> np.ndarray:

@@ -165,8 +165,9 @@ Note: TypeAlias = (
 def voltages_of_limit(system: System) -> list[VoltagesOfLimit]:
     """One on an arm whose drive has another limit than the presets'; gains of a file have their own voltages."""
     limit = limited_as(system) if is_arm(system) else None
-    other = limit is not None and not math.isclose(float(limit), ARM_LIMIT, rel_tol=1e-6)
-    return [VoltagesOfLimit(float(limit), ARM_LIMIT)] if limit is not None and other else []
+    if limit is None or math.isclose(float(limit), ARM_LIMIT, rel_tol=1e-6):
+        return []
+    return [VoltagesOfLimit(float(limit), ARM_LIMIT)]
 
 
 def gains_of_files(

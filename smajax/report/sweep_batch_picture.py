@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import scipy.stats
+import scipy  # its parts are imported when they are first used
 from matplotlib.figure import Figure
 
 from smajax.control.sweep.grid import Grid

@@ -33,7 +33,7 @@ from smajax.report.sweep_page import (
     ranked,
 )
 from smajax.report.sweep_pictures import common_limits, draw_comparison, draw_curves, draw_lines, draw_maps, lines_plot
-from smajax.report.sweep_plants import as_mismatch, hardest
+from smajax.report.sweep_plants import worst_mismatch
 from smajax.report.sweep_record import as_json
 from smajax.report.sweep_rows import write_rows
 
@@ -102,8 +102,7 @@ def write_sweep(
     replace(out / "sweep.nc", as_netcdf(as_dataset(whole, command)))
     pictures = {name: ((out / name).read_bytes(), narrow) for name, narrow in upright.items()}
     best = ranked(whole)[0].name
-    worst = [hardest(grid, one, 1) for one in whole.sweeps if one.name == best] if grid.numbered else []
-    mismatch = as_mismatch(grid, worst[0][0].plant) if worst and worst[0] else ""
+    mismatch = worst_mismatch(grid, next(one for one in whole.sweeps if one.name == best))
     steps = after_sweep(
         out, remarks.plant, best, settings.set_points, unit.shown, remarks.gains.get(best, ""), mismatch
     )

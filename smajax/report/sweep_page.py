@@ -13,6 +13,7 @@ from smajax.control.least_time import Distance
 from smajax.control.position_unit import DEGREES, PositionUnit
 from smajax.control.presets import CONTROLLERS, with_printed_law
 from smajax.control.sweep.grid import Grid
+from smajax.control.sweep.least_times import LeastTimes
 from smajax.control.sweep.run_sweep import ControllerSweep, SweepResults
 from smajax.core.provenance import made_with
 from smajax.core.wording import and_listed, counted
@@ -58,28 +59,28 @@ def perturbed_sentence(grid: Grid, sweep: ControllerSweep) -> str:
         else "the runs"
     )
     return (
-        f"On all {grid_in_words(grid)} it settles in {100 * settled_share(grid, sweep):.0f} % of {runs} at "
+        f"On all {grid_in_words(grid)} it settles in {100 * settled_share(grid, sweep, sweep.least):.0f} % of {runs} at "
         f"{grid.gains[at]:g} times its main gain{_soon(grid, sweep)}{_times_the_least(found)}; overshoot up to {overshoot:.3g}{unit.symbol}."
         f"{_beyond_own_limit(grid, sweep)}"
     )
 
 
-def beyond_own_limit(grid: Grid, sweep: ControllerSweep) -> tuple[int, int]:
-    """(runs in reach in which it does not settle, those of them that its own largest command does not reach, though that of another controller does)."""
-    unsettled = ~np.isfinite(merit_values(sweep.merits, "settling_time")[..., nominal_gain(grid)])
-    failed = unsettled & np.isfinite(sweep.least.grid)
-    return int(failed.sum()), int((failed & np.isinf(sweep.own_least.grid)).sum())
+def _unsettled(grid: Grid, sweep: ControllerSweep) -> tuple[int, int]:
+    """(runs in reach of the largest command of all in which it does not settle, those of them that its own does not reach)."""
+    found, own = (sweep.distance_at(nominal_gain(grid), least) for least in (sweep.least, sweep.own_least))
+    return (0, 0) if found is None or own is None else (found.never, found.never - own.never)
 
 
 def _beyond_own_limit(grid: Grid, sweep: ControllerSweep) -> str:
-    failed, beyond = beyond_own_limit(grid, sweep)
+    failed, beyond = _unsettled(grid, sweep)
     if not beyond:
         return ""
-    which = "The one run" if failed == 1 else f"Of the {failed} runs"
-    are = "is" if failed == 1 else f"in which it does not settle {beyond} are"
+    one, several = (
+        "The one run in which it does not settle is",
+        f"Of the {failed} runs in which it does not settle {beyond} are",
+    )
     limit = f"{sweep.own_least.limit:.4g} {grid.plants.unit.command}"
-    rest = " in which it does not settle" if failed == 1 else ""
-    return f" {which}{rest} {are} out of reach of its own largest command, {limit}."
+    return f" {one if failed == 1 else several} out of reach of its own largest command, {limit}."
 
 
 def _soon(grid: Grid, sweep: ControllerSweep) -> str:
@@ -92,10 +93,10 @@ def _soon(grid: Grid, sweep: ControllerSweep) -> str:
     return f" (half of these within {half:.3g} s, nine tenths within {most:.3g} s)"
 
 
-def settled_share(grid: Grid, sweep: ControllerSweep) -> float:
-    """Of the runs on perturbed plants at the nominal gain whose set point the plant can reach, those in which it settles; NaN of none."""
+def settled_share(grid: Grid, sweep: ControllerSweep, least: LeastTimes) -> float:
+    """Of the runs on perturbed plants at the nominal gain whose set point the plant can reach, with the command of these least times, those in which it settles; NaN of none."""
     at = nominal_gain(grid)
-    found = sweep.distance_at(at, sweep.least)
+    found = sweep.distance_at(at, least)
     if found is None:
         return float(np.isfinite(merit_values(sweep.merits, "settling_time")[..., at]).mean())
     in_reach = found.settled + found.never
@@ -312,20 +313,14 @@ class Ranked(NamedTuple):
     limit: float  # its own largest command
 
 
-def _own_reach(grid: Grid, sweep: ControllerSweep, settled: int) -> float:
-    """`Ranked.own_reach`."""
-    failed, beyond = beyond_own_limit(grid, sweep)
-    reached = settled + failed - beyond
-    return settled / reached if beyond and reached else float("nan")
-
-
 def ranked(results: SweepResults) -> list[Ranked]:
     """The best controller first: by the share of the runs in reach in which it settles, then by its distance to the least time."""
     at, unit = nominal_gain(results.grid), results.unit
     rows = []
     for one in results.sweeps:
         times, found = merit_values(one.merits, "settling_time")[..., at], one.distance_at(at, one.least)
-        settled, share = np.isfinite(times), settled_share(results.grid, one)
+        settled, share = np.isfinite(times), settled_share(results.grid, one, one.least)
+        own_limit = _unsettled(results.grid, one)[1] > 0
         rows.append(
             Ranked(
                 np.inf if np.isnan(share) else 1.0 - share,
@@ -333,7 +328,7 @@ def ranked(results: SweepResults) -> list[Ranked]:
                 float(np.quantile(times[settled], 0.5, method="inverted_cdf")) if settled.any() else np.inf,
                 one.name,
                 float(np.nanmax(merit_values(one.merits, "overshoot", unit)[..., at])),
-                _own_reach(results.grid, one, int(settled.sum())),
+                settled_share(results.grid, one, one.own_least) if own_limit else np.nan,
                 one.own_least.limit,
             )
         )

@@ -84,11 +84,14 @@ def hardest_rows(grid: Grid, sweep: ControllerSweep) -> tuple[list[str], list[li
     return head, rows
 
 
-def as_mismatch(grid: Grid, plant: int) -> str:
-    """The plant as `simulate --mismatch` takes it: `inertia_ratio=1.678,damping=0.002842`, SI."""
-    assert grid.plants.batch is not None
+def worst_mismatch(grid: Grid, sweep: ControllerSweep) -> str:
+    """The plant that a controller bears worst as `simulate --mismatch` takes it: `inertia_ratio=1.678,damping=0.002842`, SI; "" where there is no batch, or nothing in reach."""
+    worst = hardest(grid, sweep, 1) if grid.numbered else []
+    if grid.plants.batch is None or not worst:
+        return ""
     return ",".join(
-        f"{name}={value:.6g}" for name, value in zip(grid.plants.columns, grid.plants.batch[plant], strict=True)
+        f"{name}={value:.6g}"
+        for name, value in zip(grid.plants.columns, grid.plants.batch[worst[0].plant], strict=True)
     )
 
 

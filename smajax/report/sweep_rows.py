@@ -19,12 +19,11 @@ def write_rows(path: Path, grid: Grid, sweep: ControllerSweep) -> None:
     *ratios, target, gain = (axis.ravel() for axis in grid.axes())
     ratios = ratios[: len(grid.mismatches)]
     position = grid.plants.unit
-    batch = grid.plants.batch
-    values = [] if batch is None else [*batch[ratios[0].astype(int) - 1].T]  # SI
-    inputs = np.stack([*ratios, *values, position.of(target), gain], axis=1)
+    plants = {name: values.ravel() for name, values in grid.plant_values().items()}
+    inputs = np.stack([*ratios, *plants.values(), position.of(target), gain], axis=1)
     columns = [
         *grid.axis_names,
-        *(grid.plants.columns if values else ()),
+        *plants,
         f"set_point_{position.shown}",
         f"{sweep.main_gain}_ratio",
     ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -97,39 +97,39 @@ class _Options:
     def plants(self, assumed: System, plant: LoopPlants, limit: float | None) -> Plants | None:
         """What the loops run on in the place of mismatches: of more than a map has axes plants that differ in all of them. Raises typer.BadParameter."""
         names = self.mismatches(assumed)
-        if len(names) <= AXES:
+        if len(names) <= AXES or plant.plant is not None:  # which it refuses beside mismatches
             return plant.plants(SEED, others=bool(names), limit=limit)
         from smajax.control.sweep.spread_plants import SPREAD, spread_plants
 
-        replace(plant, drawn=None).plants(SEED, others=True, limit=limit)  # raises for --plant
         count = (SPREAD_FAST if self.fast else SPREAD) if plant.drawn is None else plant.drawn
         if count < 1:
             raise typer.BadParameter(f"at least one, not {count}.", param_hint="--plants")
         with refused():
-            return spread_plants(assumed, names, count, *self.ratio_range().values())
+            return spread_plants(assumed, names, count, *self.ratio_range())
 
     def plants_in_words(self, assumed: System, plants: Plants | None) -> str:
         """What the record of a request says of plants: those of more than two mismatches are known by their number, names and range."""
         import numpy as np
 
-        from smajax.control.sweep.grid import LEAST, MOST
         from smajax.core.provenance import digest
 
         names = self.mismatches(assumed)
         if len(names) <= AXES or not isinstance(plants, Mapping):
             return digest(plants)[:16]
-        least, most = self.ratio_range().values() or (LEAST, MOST)
+        least, most = self.ratio_range()
         count = np.size(next(iter(plants.values())))
         return f"{count} over {', '.join(sorted(names))}, {least:g} to {most:g} times"
 
-    def ratio_range(self) -> dict[str, float]:
-        """`least` and `most` of --ratios, nothing without it. Raises typer.BadParameter."""
+    def ratio_range(self) -> tuple[float, float]:
+        """Least and largest mismatch, of --ratios or by default. Raises typer.BadParameter."""
+        from smajax.control.sweep.grid import LEAST, MOST
+
         if self.ratios is None:
-            return {}
+            return LEAST, MOST
         both = numbers("--ratios", self.ratios)
         if len(both) != 2:
             raise typer.BadParameter(f"two numbers, such as 0.9,1.1, not `{self.ratios}`", param_hint="--ratios")
-        return dict(zip(("least", "most"), both, strict=True))
+        return both[0], both[1]
 
     def settings(self, plant: System, tuned: tuple[Gains, ...], **loop: Any) -> SweepSettings:
         """loop: further fields of `SweepSettings`. Raises typer.BadParameter."""
@@ -138,13 +138,12 @@ class _Options:
         request = self.controllers or ",".join(dict.fromkeys(one.controller for one in tuned)) or "all"
         named = [part.strip() for part in request.split(",")]
         given: dict[str, Any] = {**set_points_of(plant, self.set_points, self.fast), **loop}
+        given["ratio_range"] = self.ratio_range()
         names = self.mismatches(plant)
         if 0 < len(names) <= AXES:
             given |= dict(zip(("first", "second"), (*names, ""), strict=False))
         if self.points or self.fast:
             given["points"] = self.points or 3
-        if self.ratios is not None:
-            given["ratio_range"] = tuple(self.ratio_range().values())
         if self.gain_ratios is not None or self.fast:
             given["gain_ratios"] = numbers("--gain-ratios", "1" if self.gain_ratios is None else self.gain_ratios)
         controllers = None if named == ["all"] else [*dict.fromkeys(part for part in named if part)]

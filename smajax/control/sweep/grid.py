@@ -115,11 +115,16 @@ class Grid:
         """Both ratios, set point and ratio of the main gain of every closed loop, each of the grid's shape."""
         return np.meshgrid(self.ratios, self._second, self.targets, self.gains, indexing="ij")
 
+    def plant_values(self) -> dict[str, np.ndarray]:
+        """Of every closed loop on a batch, each of the grid's shape: column -> its plant's value, SI; nothing where there is no batch."""
+        if self.plants.batch is None:
+            return {}
+        which = self.axes()[0].astype(int) - 1
+        return {name: self.plants.batch[which, k] for k, name in enumerate(self.plants.columns)}
+
     def rows(self) -> np.ndarray:
         """`loop_rows` of the whole grid."""
         *ratios, target, gain = self.axes()
-        if self.plants.batch is not None:
-            which = ratios[0].astype(int) - 1
-            values = {name: self.plants.batch[which, k] for k, name in enumerate(self.plants.columns)}
-            return loop_rows(values, target, gain, self.plants)
+        if self.numbered:
+            return loop_rows(self.plant_values(), target, gain, self.plants)
         return loop_rows(dict(zip(self.mismatches, ratios, strict=False)), target, gain, self.plants)

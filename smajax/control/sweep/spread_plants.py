@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import scipy.stats
 
 from smajax.control.mismatch import mismatches_of, short_name
 from smajax.control.sweep.grid import LEAST, MOST, check_mismatches, check_ratios, ratios_at
 from smajax.core.parameters import get_parameters
+from smajax.core.sobol import sobol_points
 from smajax.model.system import System
 
 SPREAD = 64  # plants, where nobody says how many
@@ -41,5 +41,5 @@ def spread_plants(
             raise ValueError(
                 f"{mismatch} ({name}) is 0 where the controller assumes it, so that no ratio changes it: leave it out, or give it a value."
             )
-    points = scipy.stats.qmc.Sobol(len(names), rng=0).random_base2(int(np.ceil(np.log2(count))))[: int(count)]
+    points = sobol_points(int(count), len(names), seed=0)
     return dict(zip(names, (assumed * ratios_at(2.0 * points - 1.0, least, most)).T, strict=True))

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy  # its parts are imported when they are first used
 
 from smajax.control.tune import adam, trust
 from smajax.control.tune.evaluate import TuningProblem
@@ -21,6 +20,7 @@ from smajax.control.tune.scenarios import Scenarios
 from smajax.core.files import writing
 from smajax.core.names import close_matches
 from smajax.core.result_cache import arrays
+from smajax.core.sobol import sobol_points
 
 RULES = ("trust-region", "adam")
 EDGE = 0.03  # fraction of the box, by logarithm: distance of starts from its bounds
@@ -98,7 +98,7 @@ def begin(
     """The starts: `first` (a point of the cube), and the best of the points tried."""
     gains, wanted = len(problem.names), effort.starts - (first is not None)
     count = max(effort.tried, wanted, 1)
-    drawn = scipy.stats.qmc.Sobol(gains, rng=effort.seed).random_base2(int(np.ceil(np.log2(count))))[:count]
+    drawn = sobol_points(count, gains, effort.seed)
     drawn = EDGE + (1.0 - 2.0 * EDGE) * drawn
     if 0 < wanted < len(drawn):
         some = Scenarios(scenarios.rows[scenarios.nominal], scenarios.nominal[scenarios.nominal])

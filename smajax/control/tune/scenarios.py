@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy  # its parts are imported when they are first used
 
 from smajax.control.plants import PlantSet
 from smajax.control.position_unit import DEGREES, PositionUnit
 from smajax.control.sweep.grid import OF_ARM, loop_rows
 from smajax.core.names import close_matches
+from smajax.core.sobol import sobol_points
 
 CORNERS = 3  # mismatches of which every corner is taken
 DRAWN = 16  # plants drawn where there are more
@@ -98,7 +98,7 @@ def tuned_on(
 
 
 def _drawn(variation: Mapping[str, float], count: int, seed: int) -> list[dict[str, float]]:
-    shares = scipy.stats.qmc.Sobol(len(variation), rng=seed).random_base2(int(np.ceil(np.log2(count))))[:count]
+    shares = sobol_points(count, len(variation), seed)
     return [
         {name: 1.0 + (2.0 * one - 1.0) * share for one, (name, share) in zip(row, variation.items(), strict=True)}
         for row in shares

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 import scipy  # its parts are imported when they are first used
 
+from smajax.core.sobol import sobol_points
+
 METHODS = ("sobol", "latin-hypercube", "random")
 
 
@@ -123,8 +125,7 @@ def sampled(
         raise ValueError(f"`count` is how many samples, a whole number of 1 or more, not {count!r}.")
     low, high = (np.asarray([pair[side] for pair in box.values()], dtype=float) for side in (0, 1))
     if method == "sobol":
-        # Drawn up to a power of two, where the sequence is balanced, and cut: scipy warns of any other count.
-        shares = scipy.stats.qmc.Sobol(len(box), rng=seed).random_base2(int(np.ceil(np.log2(count))))[:count]
+        shares = sobol_points(count, len(box), seed)
     elif method == "latin-hypercube":
         shares = scipy.stats.qmc.LatinHypercube(len(box), rng=seed).random(count)
     elif method == "random":
