@@ -42,7 +42,9 @@ def key_of_round(search: JointSearch, present: FittedModel, error: float, *setti
         search.trials,
     )
     of_present = present.effects, present.width_factors, np.asarray(present.values), np.asarray(present.residual)
-    return cache.key(joint.problem, "round", *joint.described, *of_search, *of_present, float(error), *settings)
+    # Fits begin at what other models have as well (`set_starts.as_fitted_before`).
+    fitted = np.asarray([model.values for model in search.fitted.values()])
+    return cache.key(joint.problem, "round", *joint.described, *of_search, *of_present, fitted, float(error), *settings)
 
 
 def loaded_round(cache: ResultCache, key: str, traces: Callable[[], Traces]) -> Asked | None:

@@ -6,6 +6,7 @@ Nulls lack nothing; singles hold one effect of `effects.EFFECTS`, pairs two, tri
 from __future__ import annotations
 
 import zlib
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -104,8 +105,11 @@ class Truth:
         return RIGS[self.rig_name]
 
 
-def cases(drawn: int = 0) -> list[Case]:
-    """All cases, in a fixed order. drawn: 1, 2, ... for the same ones with other wires, strengths and noise, not seen in development."""
+def cases(drawn: int = 0, further: Sequence[float] = ()) -> list[Case]:
+    """All cases, in a fixed order. drawn: 1, 2, ... for the same ones with other wires, strengths and noise, not seen in development.
+
+    further: strengths at which every single effect comes once more, last.
+    """
     found = [Case(rig, (), 0.0, i) for rig in RIGS for i in range(NULLS)]
     for name in EFFECTS:
         for rig in (rig for rig in RIGS if applies(name, rig)):
@@ -118,6 +122,8 @@ def cases(drawn: int = 0) -> list[Case]:
             for several in coupon if rig == "coupon" else loaded:
                 if all(applies(name, rig) and not absorbed(name, rig) for name in several):
                     found += [Case(rig, several, strength, i) for i, strength in enumerate(STRENGTHS[1:])]
+    single = [case for case in found if case.kind in ("single", "outside") and case.strength == STRENGTHS[0]]
+    found += [replace(case, strength=strength) for strength in further for case in single]
     return [replace(case, number=case.number + ANEW * drawn) for case in found]
 
 

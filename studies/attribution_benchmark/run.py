@@ -16,7 +16,7 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from studies.attribution_benchmark.cases import Case, cases
+from studies.attribution_benchmark.cases import STRENGTHS, Case, cases
 from studies.attribution_benchmark.judge import Judged, judge, load, save
 from studies.attribution_benchmark.tables import written
 from studies.attribution_benchmark.write import write
@@ -26,7 +26,7 @@ def chosen(only: str, strengths: Sequence[float], nulls: int, part: tuple[int, i
     """The cases asked for, in their order. `nulls`: of each rig at most."""
     seen: Counter[str] = Counter()
     found = []
-    for case in cases(drawn):
+    for case in cases(drawn, [one for one in strengths if one not in STRENGTHS]):
         if only not in case.name or (case.kind != "null" and strengths and case.strength not in strengths):
             continue
         seen[f"{case.rig} {case.kind}"] += 1
@@ -62,7 +62,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--only", default="", help="a part of the cases' names")
-    parser.add_argument("--strength", type=float, action="append", default=[], help="1, 3 or 10; may be given again")
+    parser.add_argument(
+        "--strength",
+        type=float,
+        action="append",
+        default=[],
+        help="1, 3 or 10, or another of single effects; may be given again",
+    )
     parser.add_argument("--nulls", type=int, default=30, help="of each rig")
     parser.add_argument("--part", default="1/1")
     parser.add_argument(
@@ -88,7 +94,7 @@ def main() -> None:
         save(one, path)
         mark = "right" if one.right else "equation right" if one.equation_right else "wrong"
         print(
-            f"[{number}/{len(todo)}] {case.name} ({one.strength:.1f}): {one.verdict} {'+'.join(one.added)} {mark}; "
+            f"[{number}/{len(todo)}] {case.name} ({one.strength:.2g}): {one.verdict} {'+'.join(one.added)} {mark}; "
             f"{one.held_out_before:.2f} -> {one.held_out_after:.2f}, {one.seconds:.0f} s",
             flush=True,
         )

@@ -16,6 +16,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from smajax.control.position_unit import DEGREES
+from smajax.control.sweep.run_sweep import sweep_controllers, sweep_settings_for
 from smajax.control.sweep.spread_plants import spread_plants
 from smajax.core.parameters import parameter_values, set_parameters
 from smajax.model.rigs import arm
@@ -66,6 +67,18 @@ def test_fewer_plants_are_the_first_of_more_in_any_order_of_the_names() -> None:
     assert list(many) == list(few)
     for name, values in few.items():
         np.testing.assert_array_equal(values, many[name][:10])
+
+
+def test_the_figures_of_a_plant_are_the_same_whatever_the_number_of_plants() -> None:
+    """Of a noisy position too: the noise goes by the loop's row."""
+    small = {"seconds": 2.0, "set_points": (20.0, 60.0), "gain_ratios": (1.0,), "tolerance": None}
+    settings = sweep_settings_for(arm(), ["pid"], noise=0.2, **small)
+    (few,), (many,) = (
+        list(sweep_controllers(arm(), settings, plants=spread_plants(arm(), THREE, count))) for count in (3, 6)
+    )
+    np.testing.assert_array_equal(few.nominal.steady_error, many.nominal.steady_error)
+    np.testing.assert_array_equal(few.merits.steady_error, many.merits.steady_error[:3])
+    assert len(np.unique(many.merits.steady_error)) == 12
 
 
 def test_the_parameters_drawn_are_those_on_which_the_figures_hang() -> None:

@@ -74,6 +74,32 @@ def test_page_terminal_record_and_list_say_the_same_of_what_is_not_confirmed(
     assert [cells(row)[1] for row in rows] == [verdict]
 
 
+def _adequate(off: bool) -> Findings:
+    """A base model that leaves noise on the fit runs, and on the held-out ones or not."""
+    findings = made_findings()
+    runs = tuple(
+        _off(one, 2.0 * findings.noise_sigma) if off and one.role == "held-out" else one for one in findings.runs
+    )
+    effects = tuple(dataclasses.replace(one, added=False) for one in findings.effects)
+    return dataclasses.replace(findings, runs=runs, effects=effects, verdict=Verdict.ADEQUATE)
+
+
+@pytest.mark.usefixtures("blank_pictures")
+def test_a_model_that_is_adequate_on_the_fit_runs_alone_says_so_everywhere(tmp_path: Path, capsys: Any) -> None:
+    """Nothing tells the reader sooner that the fit runs did not show what is missing."""
+    assert headline(_adequate(off=False)) == ("The model is adequate", "good")
+    findings = _adequate(off=True)
+    assert headline(findings) == ("Adequate on the fit runs, but not on every held-out run", "fair")
+    first = narrate(findings).summary[0]
+    off = [run.name for run in findings.runs if run.role == "held-out"]
+    assert all(name in first for name in off)
+    assert 'role = "fit"' in first
+    assert findings_to_json(findings)["held_out_runs"] == "not on every held-out run"
+    assert "<dd>adequate, not on every held-out run</dd>" in findings_to_html(findings)
+    print_findings(findings, tmp_path / "report.html")
+    assert "Verdict: adequate, not on every held-out run" in capsys.readouterr().out.splitlines()
+
+
 def test_the_text_agrees_with_the_headline() -> None:
     said = " ".join(narrate(_unconfirmed()).summary)
     assert "neither confirm nor refute" in said or "does worse than the base model" in said

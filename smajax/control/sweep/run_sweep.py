@@ -352,8 +352,8 @@ def _computed(
         interface_of(plant, *between, settings.delay, settings.quantum),
         perturbation=plants.perturbation,
     )
-    # One batch, one program.
-    whole = np.concatenate([grid.rows(), loop_rows({}, grid.targets, plants=plants)])
+    # One batch, one program. The unperturbed plant first: the noise of a loop goes by its row, and not by how many plants follow.
+    whole = np.concatenate([loop_rows({}, grid.targets, plants=plants), grid.rows()])
     setup, error = integrated_setup(setup, whole, settings.tolerance)
     outcome = closed_loops(setup, whole, relabelled)
     angles: Sequence[np.ndarray] = ()
@@ -362,7 +362,7 @@ def _computed(
         ratios = np.asarray(settings.line_ratios)
         rows = np.concatenate([loop_rows({one: ratios}, target, plants=plants) for one in lined])
         angles = list(positions(setup, rows).reshape(len(lined), len(LINES), -1))
-    inside, nominal = slice(grid.size), grid.size + np.arange(len(grid.targets))
+    nominal, inside = slice(len(grid.targets)), slice(len(grid.targets), None)
     result: dict[str, Any] = {"failed": outcome.failed_at[inside].reshape(grid.shape)}
     result["integration_error"] = np.asarray(json_line(error.record()))
     both = least_times_of(setup, grid, [shared, _limit(system, name, settings).largest])

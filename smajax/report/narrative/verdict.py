@@ -53,6 +53,7 @@ DOUBTFUL = {
     NOT_CONFIRMED: ("Explained on the fit runs, but not confirmed by held-out runs", "fair"),
     NOT_EVERY_RUN: ("Explained on the fit runs, but not on every held-out run", "fair"),
 }
+ADEQUATE_ON_FIT_RUNS = ("Adequate on the fit runs, but not on every held-out run", "fair")
 OF_ONE_RUN = ("Explained on the one fit run, and no other run confirms it", "fair")
 
 
@@ -66,16 +67,20 @@ def headline(findings: Findings) -> tuple[str, str]:
     if unknowns_at_bounds(findings):
         return UNKNOWN_AT_A_BOUND[findings.verdict]
     if why := doubt(findings):
+        if findings.verdict is Verdict.ADEQUATE:
+            return ADEQUATE_ON_FIT_RUNS
         return DOUBTFUL[why] if _held_out(findings) else OF_ONE_RUN
     return MANY_STAND_IN if _stand_in(findings) else VERDICTS[findings.verdict]
 
 
 def doubt(findings: Findings) -> str:
-    """What runs that the fit did not see leave of a model that explains the fit runs: empty where they confirm it.
+    """What runs that the fit did not see leave of a model that describes the fit runs to the noise: empty where they confirm it.
 
     `not confirmed` where they are not predicted better than by the base model beyond chance, or where there is one fit run and no
-    other; `not on every held-out run` where one of them is off by more than the fit runs.
+    other; `not on every held-out run` where one of them is off by more than the fit runs. Of the base model alone only the latter.
     """
+    if findings.verdict is Verdict.ADEQUATE:
+        return NOT_EVERY_RUN if caveats.held_out_off(findings) else ""
     if findings.verdict is not Verdict.EXPLAINED:
         return ""
     if not _held_out(findings):
@@ -148,10 +153,7 @@ def summary(findings: Findings) -> tuple[str, ...]:
 def _opening(findings: Findings) -> str:
     match findings.verdict:
         case Verdict.ADEQUATE:
-            return (
-                "Nothing is missing whose trace is larger than the noise: what the base model leaves of the fit runs cannot be "
-                "distinguished from measurement noise."
-            )
+            return _adequate(findings)
         case Verdict.EXPLAINED:
             return _explained(findings)
         case Verdict.PARTLY_EXPLAINED:
@@ -160,6 +162,19 @@ def _opening(findings: Findings) -> str:
             return f"Not finished: {findings.remaining} were still to come when this was written. What stands here is what was known by then."
         case Verdict.NOT_IN_LIBRARY:
             return _not_in_library(findings)
+
+
+def _adequate(findings: Findings) -> str:
+    """Of the fit runs; and which held-out runs say the contrary."""
+    noise = "what the base model leaves of the fit runs cannot be distinguished from measurement noise"
+    if not (off := caveats.held_out_off(findings)):
+        return f"Nothing is missing whose trace is larger than the noise: {noise}."
+    several = len(off) > 1
+    return (
+        f"The fit runs lack nothing: {noise}. But {and_listed([run.name for run in off])}, held out, {'are' if several else 'is'} predicted worse: what shows "
+        f"there does not show in the fit runs, or these do not determine a parameter that matters there. Make {'one of them' if several else 'it'} a fit run "
+        '(role = "fit") and run again.'
+    )
 
 
 def _in_one_run(findings: Findings) -> list[OutlierRun]:
