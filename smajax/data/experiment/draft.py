@@ -243,7 +243,7 @@ def _time(inputs: _Inputs) -> _Section:
         if (clock := _clock(table, [*inputs.overrides(file).values(), *every])) is not None
     ]
     if not clocks:
-        return _no_time(inputs.tables)
+        return _no_time(inputs.tables, heated=inputs.model.drive != "none")
     if len(clocks) < len(inputs.tables):
         raise MeasuredDataError("some of the files have a time and others have none; give all of them one")
     lines: list[str] = []
@@ -270,12 +270,19 @@ def _time(inputs: _Inputs) -> _Section:
     return _Section(lines, [message, *rates_messages([file.name for file in inputs.files], periods)])
 
 
-def _no_time(tables: Sequence[Table]) -> _Section:
+def _no_time(tables: Sequence[Table], heated: bool) -> _Section:
     """No column is a time: samples are counted, or a column that should be one is named with what is wrong."""
     wrong = next(((table, *one) for table in tables for one in times_not_read(table).items()), None)
     if wrong is None:
         lines = ["[time]  # no column is a time: samples are counted", 'kind = "sample"', ""]
-        return _Section(lines, [f"time: none found, samples are counted ({GUESS})"])
+        why = "of a heated wire it has to be given" if heated else "where it is known"
+        lines += [
+            "# [sampling]",
+            f'# step = "{50 if heated else 1000} ms"  # the time from one sample to the next: {why}',
+            "",
+        ]
+        todo = "; write the time from one sample to the next as step under [sampling]" if heated else ""
+        return _Section(lines, [f"time: none found, samples are counted ({GUESS}){todo}"], first=heated)
     table, name, why = wrong
     lines = [
         f"[time]  # NOT READ: {why}",
@@ -288,7 +295,7 @@ def _no_time(tables: Sequence[Table]) -> _Section:
     ]
     message = (
         f"time: NOT READ: {why}. Repair that and draft again; or write kind = 'sample' in place of all under [time], "
-        "and leave [sampling] out, where samples are to be counted"
+        "and the time from one sample to the next as step under [sampling], where samples are to be counted"
     )
     return _Section(lines, [message], first=True)
 

@@ -117,18 +117,28 @@ def _check_runs(path: Path, file: ExperimentFile, model: ModelDescription) -> No
         raise ExperimentError(path, "runs", "no run has role = 'fit'; give at least one")
 
 
-def _step(path: Path, file: ExperimentFile) -> float:
-    by_sample = file.time is not None and file.time.kind == "sample"
+def _has_times(file: ExperimentFile) -> bool:
+    """Of its samples: counted ones have times where the file says how far apart they are."""
+    return file.time is None or file.time.kind != "sample" or file.sampling is not None
+
+
+def _step(path: Path, file: ExperimentFile, heated: bool) -> float:
+    """s. heated: whether a drive heats the wire, which takes its time."""
     if file.sampling is None:
-        if by_sample:
+        if not _has_times(file) and not heated:
             return 1.0
+        if not _has_times(file):
+            raise ExperimentError(
+                path,
+                "sampling",
+                "is missing; samples are counted ([time] kind = 'sample'), and how warm a heated wire gets depends on their times: add a section "
+                "[sampling] with step = '50 ms' or so, the time from one sample to the next",
+            )
         raise ExperimentError(path, "sampling", "is missing; expected a section [sampling] with step = '50 ms' or so")
     with at_key(path, "sampling.step"):
         step = parse_quantity(file.sampling.step, "s", offered=time_unit(file.time))
     if step <= 0.0:
         raise ExperimentError(path, "sampling.step", f"got {file.sampling.step!r}, expected a time above zero")
-    if by_sample and step != 1.0:
-        raise ExperimentError(path, "sampling.step", "with [time] kind = 'sample' the step is 1 s; remove [sampling]")
     return step
 
 
@@ -301,7 +311,7 @@ def experiment_of(path: Path, file: ExperimentFile, catalogue: Catalogue) -> Exp
         output_names=output_names,
         inputs_sampled=model.inputs_sampled,
         inputs_squared=model.inputs_squared,
-        step=_step(path, file),
+        step=_step(path, file, bool(model.heats)),
         tables=lru_cache(maxsize=None)(partial(read_table, wanted=_columns(file), decimal=file.data.decimal)),
     )
     runs = [
@@ -338,7 +348,7 @@ def experiment_of(path: Path, file: ExperimentFile, catalogue: Catalogue) -> Exp
         parameters=fixed,
         unknowns=free,
         step=reading.step,
-        clocked=file.time is None or file.time.kind != "sample",
+        clocked=_has_times(file),
         outputs=tuple(output for output, _ in outputs),
         effects_only=tuple(file.effects.only) if file.effects.only is not None else None,
         effects_excluded=tuple(file.effects.exclude),
@@ -359,8 +369,8 @@ def _log_warnings(
 ) -> list[str]:
     """Of the logs alone, whatever the model. outputs: each with the sigma of its noise at the sensor's own rate."""
     warnings = [text for read in runs for text in run_warnings(read, reading.step)]
-    if file.time is None or file.time.kind != "sample":
-        warnings += length_warnings(runs, "s" if file.time is None else file.time.unit)
+    if _has_times(file):
+        warnings += length_warnings(runs, time_unit(file.time))
     warnings += heading_warnings(file.channels, file.time)
     for run in file.runs:
         warnings += heading_warnings(*own_columns(reading.path, run, file.channels, file.time), run)

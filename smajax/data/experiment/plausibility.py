@@ -88,7 +88,7 @@ def _repeated_warnings(run: str, signals: Mapping[str, Signal]) -> list[str]:
     ]
 
 
-def _time_warnings(run: str, name: str, signal: Signal) -> list[str]:
+def _time_warnings(run: str, name: str, signal: Signal, is_output: bool) -> list[str]:
     intervals = np.diff(signal.time)
     usual = float(np.median(intervals))
     longest = int(np.argmax(intervals))
@@ -112,7 +112,8 @@ def _time_warnings(run: str, name: str, signal: Signal) -> list[str]:
     return [
         *result,
         f"run {run!r}: {name!r} has a gap of {intervals[longest]:.4g} s at {signal.time[longest]:.6g} s "
-        f"(usual interval {usual:.4g} s); it is bridged, check that nothing happened in it",
+        f"(usual interval {usual:.4g} s); it is bridged, check that nothing happened in it"
+        + (", or write missing = 'skip' for this output, which leaves it out" if is_output else ""),
     ]
 
 
@@ -125,7 +126,7 @@ def run_warnings(read: ReadRun, step: float) -> list[str]:
     clocked = {name: signal for name, signal in read.signals.items() if name not in read.skipping}
     result += _repeated_warnings(run.name, clocked)
     for name, signal in clocked.items():
-        result += _time_warnings(run.name, name, signal)
+        result += _time_warnings(run.name, name, signal, name in run.outputs)
     duty = run.inputs.get("duty")
     if duty is not None and (duty.min() < 0.0 or duty.max() > 1.0):
         result.append(

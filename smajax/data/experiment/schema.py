@@ -77,7 +77,7 @@ class NuisanceSection(Section):
 
 
 class SamplingSection(Section):
-    """The uniform clock that all signals are brought to."""
+    """The uniform clock that all signals are brought to; of samples that are counted, how far apart they are."""
 
     step: Quantity = Field(description="text like '50 ms'")
 
@@ -85,7 +85,9 @@ class SamplingSection(Section):
 class TimeSection(Section):
     """Where the time is, for files whose signals carry none of their own."""
 
-    kind: Literal["column", "sample"] = Field(default="column", description="'column' or 'sample'")
+    kind: Literal["column", "sample"] = Field(
+        default="column", description="'column' or 'sample' (samples are counted)"
+    )
     column: str | int | None = Field(default=None, description="the name of the time column, or its number from 1")
     unit: str = Field(default="s", description="text like 's' or 'ms'")
     repeated: Literal["refuse", "mean", "last"] = Field(
@@ -144,7 +146,7 @@ class LogFormat(Section):
 class DataSection(Section):
     """Where the measured files are."""
 
-    folder: str = Field(description="a folder, relative to this file; it may begin with ${SMAJAX_DATA}")
+    folder: str = Field(default=".", description="a folder, relative to this file; it may begin with ${SMAJAX_DATA}")
     decimal: Literal[",", "."] | None = Field(
         default=None, description="',' or '.': what stands before the decimals of a number in a text file"
     )
@@ -269,7 +271,7 @@ class ExperimentFile(Section):
     sampling: SamplingSection | None = Field(default=None, description="a section [sampling] with step")
     time: TimeSection | None = Field(default=None, description="a section [time] with column and unit, or kind")
     channels: dict[str, ChannelSection] = Field(description="sections [channels.NAME] with role, unit and a place")
-    data: DataSection = Field(default=DataSection(folder="."), description="a section [data] with folder")
+    data: DataSection = Field(default=DataSection(), description="a section [data] with folder")
     runs: list[RunSection] = Field(min_length=1, description="one section [[runs]] a run, with name, role and file")
     effects: EffectsSection = Field(default=EffectsSection(), description="a section [effects]")
     priors: PriorsSection = Field(

@@ -132,8 +132,9 @@ def _signal(
     own_unit: str,
     time: TimeSection | None,
     taken: Collection[str | int],
+    step: float,
 ) -> Signal:
-    """One channel from its table. taken: the columns of the time and the other channels. Raises MeasuredDataError."""
+    """One channel from its table. taken: the columns of the time and the other channels. step: s between samples that are counted. Raises MeasuredDataError."""
     try:
         written = table.column(key, taken, gaps=channel.missing == "skip")
         values = convert(written, channel.unit, own_unit)
@@ -152,7 +153,7 @@ def _signal(
     clock = table.clock(key)
     where, unit = f"{table.path}: the time of {key!r}", "s"
     if time is not None and time.kind == "sample":
-        clock = np.arange(values.size, dtype=np.float64)
+        clock = step * np.arange(values.size, dtype=np.float64)
     elif clock is None:
         if time is None or time.column is None:
             raise MeasuredDataError(
@@ -210,9 +211,8 @@ def _read_signals(reading: Reading, run: RunSection) -> tuple[dict[str, Signal],
         with at_key(reading.path, where):
             table = reading.tables(file)
             try:
-                signals[name] = _signal(
-                    table, name, key, channel, reading.units[name], reading.time, _taken(reading, name)
-                )
+                own_unit, taken = reading.units[name], _taken(reading, name)
+                signals[name] = _signal(table, name, key, channel, own_unit, reading.time, taken, reading.step)
             except NoColumnError as error:
                 own = TIME if reading.time is not None and error.key == reading.time.column else name
                 hint = f"; where this log alone has another one, write columns = {{ {own} = '...' }} under its [[runs]] in the experiment file"
