@@ -310,7 +310,7 @@ def after_figures() -> list[Step]:
     return [
         Step(
             "Run the model of these figures with inputs of your own",
-            command("simulate", "--step", "7V:2s,0V:3s", "--out", "simulated"),
+            command("simulate", "--step", "7.4V:6s,0V:6s", "--out", "simulated"),
         ),
         Step("Compare its controllers", command("sweep", "--controllers", "pid,sld", "--fast", "--out", "sweep")),
         Step(

@@ -177,6 +177,10 @@ def mismatch_rows(result: RunResult) -> list[list[str]]:
     ]
 
 
+def _transforms(data: xr.Dataset) -> bool:
+    return float(np.ptp(data["martensite_fraction"].to_numpy())) >= STILL
+
+
 def run_sentences(result: RunResult) -> list[str]:
     """The run in sentences: temperature, transformation, stroke; none where it has values that are not finite."""
     data = result.data
@@ -194,7 +198,7 @@ def run_sentences(result: RunResult) -> list[str]:
     ]
     fraction = data["martensite_fraction"]
     least, greatest, last = float(fraction.min()), float(fraction.max()), float(fraction[-1])
-    if greatest - least < STILL:
+    if not _transforms(data):
         sentences.append(f"It does not transform: the martensite fraction stays at {digits(last, 3)}.")
     else:
         sentences.append(
@@ -281,7 +285,12 @@ def _answer(result: RunResult) -> str:
         parts = [f"{' '.join(cells)} over the {part}" for part, cells in _tracking(result).items()]
         return f"{name} follows the reference with an RMS tracking error of {and_listed(parts)}."
     log = measured_sentences(result)
-    return log[0] if log else run_sentences(result)[2] if not name else f"{name}: {run_sentences(result)[2]}"
+    if log:
+        return log[0]
+    hottest, transforms, way = run_sentences(result)[:3]
+    # Who looks at the position alone takes what is elastic for a stroke.
+    said = way if _transforms(data) else f"{way} {hottest} {transforms}"
+    return f"{name}: {said}" if name else said
 
 
 def _errors(result: RunResult, figures: Sequence[Mapping[str, float]]) -> str:

@@ -99,6 +99,11 @@ def test_a_closed_loop_says_whether_it_settles_and_an_open_run_where_it_goes() -
     assert simulate_words.answer(RunResult(data, system, {}, ())) == (
         "The position starts at 0 mm, lies between 0 mm and 10 mm, and ends at 10 mm."
     )
+    still = data.assign(martensite_fraction=("time", np.ones(11), {"units": "-"}))
+    assert simulate_words.answer(RunResult(still, system, {}, ())) == (
+        "The position starts at 0 mm, lies between 0 mm and 10 mm, and ends at 10 mm. "
+        "The wire is at most 0.01 °C, 1 s in. It does not transform: the martensite fraction stays at 1."
+    )
     data["wanted"] = ("time", np.full(11, 0.005), {"units": "m"})
     data = data.assign_attrs(controller="pid")
 
