@@ -123,7 +123,7 @@ def names() -> str:
         "`import smajax as sma` has these names, as `sma.compose` and so on. Everything else is in modules, on the pages that these link.",
         "When a name here changes, the old one keeps working for a minor version, with a DeprecationWarning.",
         "",
-        'Set JAX\'s precision before the first array: `jax.config.update("jax_enable_x64", True)`.',
+        "Set the precision before the first array of JAX: `sma.prepare()` takes float64, and keeps compiled programs from one process to the next.",
     ]
     for heading, members in _stages():
         lines += ["", f"## {heading}", "", "| name | | |", "|---|---|---|", *(_row(name) for name in members)]

@@ -63,7 +63,7 @@ LoadName = Annotated[
 ]
 DriveName = Annotated[
     str,
-    typer.Option("--drive", help="a drive of `smajax presets` that takes a voltage", autocompletion=completion.drives),
+    typer.Option("--drive", help="what heats it: a drive of `smajax presets`", autocompletion=completion.drives),
 ]
 LawName = Annotated[
     str,

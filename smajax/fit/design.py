@@ -37,7 +37,7 @@ def _shapes(count: int) -> dict[str, np.ndarray]:
     staircase = np.concatenate([np.linspace(0.25, 1.0, 4), np.linspace(0.75, 0.0, 4)])
     return {
         "held for 60 % of the run, then off": np.where(t < 0.6, 1.0, 0.0),
-        "three equal pulses": np.where((6.0 * t).astype(int) % 2 == 0, 1.0, 0.0),
+        "in three equal pulses": np.where((6.0 * t).astype(int) % 2 == 0, 1.0, 0.0),
         "ramped up and down once": 1.0 - np.abs(2.0 * t - 1.0),
         "ramped up and down three times": 1.0 - np.abs(2.0 * ((3.0 * t) % 1.0) - 1.0),
         "in stairs up and down": staircase[np.minimum((8.0 * t).astype(int), 7)],

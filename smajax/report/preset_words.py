@@ -22,8 +22,7 @@ def _noises(one: PresetInfluence) -> str:
 
 
 def _effect(one: PresetInfluence) -> str:
-    noises = _noises(one)
-    return f"{_change(one)} changes the output by {noises} noise{'' if noises == '1' else 's'}"
+    return f"{_change(one)} changes the output by {_noises(one)} times its noise"
 
 
 def remarks(ranking: PresetRanking) -> dict[str, str]:

@@ -37,7 +37,9 @@ def test_what_is_left_to_the_preset_is_listed_by_its_importance(tmp_path: Path) 
     (said,) = [line for line in ended.out.splitlines() if "these matter most on your runs" in line]
     first, *others = re.findall(r"(\w+) \([\d.]+ (?:%|K)", said.split(": ", 1)[1])
     text = out.read_text()
-    asked = re.findall(r"^# (\w+) = .*?; ([\d.]+) (?:%|K) changes the output by ([\d.]+) noises?$", text, re.MULTILINE)
+    asked = re.findall(
+        r"^# (\w+) = .*?; ([\d.]+) (?:%|K) changes the output by ([\d.]+) times its noise$", text, re.MULTILINE
+    )
     assert [name for name, *_ in asked][:5] == [first, *others]
     noises = [float(number) for *_, number in asked]
     assert noises == sorted(noises, reverse=True)
@@ -105,6 +107,6 @@ def test_a_coupon_is_ranked_too(tmp_path: Path) -> None:
     ended = smajax("new-experiment", tmp_path / "oven.csv", "--out", tmp_path / "e.toml")
     assert ended.code == 0, ended.said
     assert re.search(
-        r"stress_slope_\w+ \(20 % changes the output by [\d.]+ noises\), stress_slope_\w+ \(20 %: ", ended.out
+        r"stress_slope_\w+ \(20 % changes the output by [\d.]+ times its noise\), stress_slope_\w+ \(20 %: ", ended.out
     )
     assert "\n# stress_slope_austenite = " in (tmp_path / "e.toml").read_text()

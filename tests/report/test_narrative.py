@@ -237,16 +237,16 @@ def test_a_value_of_a_preset_far_from_its_prior_is_reported_with_the_distance() 
         for name, (value, widths) in fitted.items()
     )
     said = _summary(after=after)
-    far = "far_modulus ends 3.1 widths of its prior above the middle of that, 7.5e4 MPa"
-    assert f"Mind: {far}; low_modulus ends 2.5 widths" in said.replace(" and low", "; low")
+    far = "far_modulus ends at 100 GPa, 3.1 standard deviations above what was known before, 75 GPa"
+    assert f"Mind: {far}; low_modulus ends at 40 GPa, 2.5 standard deviations" in said.replace(" and low", "; low")
     assert "near_modulus" not in said
     assert "edge_modulus" not in said
     page = findings_to_html(dataclasses.replace(made_findings(), after=after))
-    assert "2.5 widths of its prior below the middle of that" in page
+    assert "2.5 standard deviations below what was known before" in page
     effect = made_findings().added[0].name
     coefficient = dataclasses.replace(after[2], name=f"{effect}.size")  # of an effect that keeps its priors
     said = _summary(after=(coefficient,))
-    assert f"Mind: {effect}.size ends 3.1 widths of its prior above" in said
+    assert f"Mind: {effect}.size ends at 100 GPa, 3.1 standard deviations above" in said
     assert "[priors.presets]" not in said
     at_its_bound = dataclasses.replace(after[2], remark=Remark(RemarkKind.UPPER_BOUND))
     assert "widen its bounds" not in _summary(after=(at_its_bound,))  # the file has none of it
@@ -278,7 +278,7 @@ def test_a_confounder_that_priors_alone_tell_is_minded_with_the_run_that_separat
     said = _summary(confounders=(one,))
     other = "radiation to the surroundings in its place (log-likelihood ratio -1.2)"
     assert f"hardly tell latent heat of transformation from {other}" in said
-    assert "A run with a ramp would tell radiation to the surroundings by 4.2 times the noise." in said
+    assert "A run with a ramp would tell it from radiation to the surroundings by 4.2 times the noise." in said
     assert "would tell" not in _summary(confounders=(dataclasses.replace(one, separation=0.2),))
     both = _summary(confounders=(one, dataclasses.replace(one, confounder="sensor_lag", separation=5.0)))
     assert both.count("Mind: the fit runs alone") == 1

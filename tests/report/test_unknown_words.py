@@ -72,7 +72,7 @@ def test_an_equation_is_named_only_if_no_other_explains_as_much() -> None:
     none = _with_terms(False, log_odds=-2.0)[1]
     assert "Nor do these runs determine in which equation" in none
     assert "none is likelier than no function at all" in none
-    assert "less likely than none by 2.0 in log odds" in none
+    assert "less likely than none by 2.0 in log odds (7.4 to 1)" in none
     assert "on those held out" in _with_terms(True, held_out=(2.0, 1.0))[1]
     assert "is not validated on the held-out runs" in _with_terms(False, held_out=(1.0, 2.0))[1]
 

@@ -62,7 +62,9 @@ def export(
     model, before there is anything measured. Nothing of Python or JAX is in what is written.
 
     Example:  smajax export report/model.toml --to fmu --out actuator.fmu
+
     Example:  smajax export --to fmu --wire flexinol_ht_500um --load bias_spring --drive voltage
+
     Example:  smajax export tuned/gains.json --to c --model report/model.toml --estimator model --out bench
     """
     from smajax.core.runtime import prepare

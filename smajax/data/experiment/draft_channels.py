@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from smajax.data.experiment.column_guess import GUESS, LIKELY, SURE, Column
+from smajax.data.experiment.schema import noise_example
 from smajax.data.experiment.toml_file import toml_value
 
 ABSOLUTE = ("temperature", "resistance")  # whose zero nobody sets from run to run, as that of a position
@@ -25,7 +26,7 @@ def channel_lines(name: str, role: str, column: Column, variable: bool, off: boo
     ]
     if role == "output":
         lines += ['missing = "skip"  # empty cells are omitted'] if gaps else []
-        lines.append('noise = "estimate"  # or its sigma, such as "0.01 mm"')
+        lines.append(f'noise = "estimate"  # or its sigma, such as "{noise_example(column.unit)}"')
         if name in ABSOLUTE:
             lines.append(
                 "offset = false  # what the sensor shows is true as it is: a zero of each run would hide what the model lacks"

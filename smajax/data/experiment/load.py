@@ -32,7 +32,7 @@ from smajax.data.experiment.plausibility import (
 )
 from smajax.data.experiment.record import Experiment, FromModelFile, Output, Run, Unknown
 from smajax.data.experiment.recorded_ambient import AMBIENT, ambient_warnings
-from smajax.data.experiment.schema import ExperimentFile, read_schema
+from smajax.data.experiment.schema import ExperimentFile, noise_example, read_schema
 from smajax.data.experiment.shared_columns import check_columns
 from smajax.data.experiment.signals import Reading, ReadRun, read_run, time_unit
 from smajax.data.experiment.unknowns import (
@@ -48,8 +48,6 @@ from smajax.data.readers.read import read_table
 ESTIMATE = "estimate"
 # Times the largest reading below which, and times the range above which, a noise is none.
 FINEST, COARSEST = 1e-12, 1e3
-# A noise that a sensor may have, as an example, where the channel's own unit is too large for one or shows none.
-_EXAMPLES = {"m": "0.01 mm", "Pa": "0.1 MPa", "rad": "0.1 deg", "1": "0.01 %", "-": "0.01 %"}
 
 
 def _describe(path: Path, file: ExperimentFile, catalogue: Catalogue) -> ModelDescription:
@@ -166,7 +164,7 @@ def _output(path: Path, file: ExperimentFile, name: str, unit: str, runs: Sequen
     channel = file.channels[name]
     given = channel.noise
     offset = file.nuisance.offset if channel.offset is None else channel.offset
-    example = _EXAMPLES.get(unit, f"0.01 {channel.unit}")
+    example = noise_example(channel.unit)
     fit = [read for read in runs if np.isfinite(read.run.outputs[name]).any()]
     if not fit:
         raise ExperimentError(path, f"channels.{name}", "no fit run has a sample of it; remove the channel")

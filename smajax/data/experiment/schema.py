@@ -103,6 +103,12 @@ class TimeSection(Section):
         return self
 
 
+def noise_example(unit: str) -> str:
+    """A noise as a file may give it, of a sensor whose readings are in `unit`: 0.01 mm."""
+    number = "0.1" if unit in ("deg", "rad", "Pa", "MPa", "degC", "K") else "0.01"
+    return f"{number} {({'m': 'mm', 'rad': 'deg', 'Pa': 'MPa', '1': '%', '-': '%', '': '%'}).get(unit, unit)}"
+
+
 class ChannelSection(Section):
     """One signal: what it is in the model, and where it is in the files."""
 

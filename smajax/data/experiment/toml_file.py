@@ -152,7 +152,8 @@ def read_toml(path: Path, what: str, folder: str = "", hint: str = "") -> dict[s
         # Beside its own error the parser lets through those of numbers too long and of brackets too deep.
         if isinstance(error, ExperimentError):
             raise
-        raise ExperimentError(path, "", f"is not TOML: {shortened(str(error))}{hint}") from error
+        bare = "; text stands in quotation marks, as in unit = 'mm'" if "Invalid value" in str(error) else ""
+        raise ExperimentError(path, "", f"is not TOML: {shortened(str(error))}{bare}{hint}") from error
 
 
 def validated(path: Path, content: dict[str, Any], whole: type[Whole], places: Places) -> Whole:

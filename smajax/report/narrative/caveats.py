@@ -24,7 +24,7 @@ from smajax.core.wording import and_listed
 from smajax.model.effects.library import LIBRARY
 from smajax.report.identifiability_words import remark_text
 from smajax.report.narrative.uncertain_effects import uncertain_effects
-from smajax.report.narrative.values import assumed_text, error_text, far_text, value_text
+from smajax.report.narrative.values import as_written, assumed_text, error_text, far_text, value_text
 
 NAMED_SIZES = 4  # in a sentence
 UNLIKE = 2.0  # by which the noises that outputs leave differ and are more than noise
@@ -194,21 +194,25 @@ def of_priors_left(findings: Findings) -> Iterator[str]:
     """Values of presets that end far from what data sheets leave open, and unknowns and coefficients that end far from their priors."""
     added = tuple(f"{effect.name}." for effect in findings.added)
     texts = {one: text for one in findings.after if (text := far_text(findings, one))}
-    own = [f"{one.name} ends {text}" for one, text in texts.items() if one.prior_of_unknown]
+    own = [_ends_far(one, text) for one, text in texts.items() if one.prior_of_unknown]
     if own:
         yield f"Mind: {and_listed(own)}. The runs contradict what the experiment file says of it, or it stands in for what the model lacks."
-    of_effects = [f"{one.name} ends {text}" for one, text in texts.items() if one.name.startswith(added)]
+    of_effects = [_ends_far(one, text) for one, text in texts.items() if one.name.startswith(added)]
     if of_effects:
         yield f"Mind: {and_listed(of_effects)}. That is further than is likely: the effect may stand in for another."
-    far = {one.name: text for one, text in texts.items() if not one.prior_of_unknown and not one.name.startswith(added)}
+    far = [one for one in texts if not one.prior_of_unknown and not one.name.startswith(added)]
     if not far:
         return
-    ends = [f"{name} ends {text}" for name, text in far.items()]
+    ends = [_ends_far(one, texts[one]) for one in far]
     what, them, is_ = ("it stands", "it", "it is") if len(far) == 1 else ("they stand", "them", "they are")
     yield (
         f"Mind: {and_listed(ends)}. The wire is another one, or {what} in for what the model lacks: measure {them} and list {them} under "
         f"[model.parameters], or say under [priors.presets] how uncertain {is_}."
     )
+
+
+def _ends_far(parameter: ParameterFinding, text: str) -> str:
+    return f"{parameter.name} ends at {as_written(parameter, parameter.value)}, {text}"
 
 
 def of_what_priors_alone_tell(findings: Findings) -> Iterator[str]:
@@ -235,7 +239,7 @@ def _separated(some: Sequence[Confounder], titles: Mapping[str, str]) -> str:
     most = max(some, key=lambda one: one.separation if one.separating_run else 0.0)
     if not most.separating_run or most.separation < LEAST_SEPARATION:
         return ""
-    return f" A run with {most.separating_run} would tell {titles[most.confounder]} by {most.separation:.1f} times the noise."
+    return f" A run with {most.separating_run} would tell it from {titles[most.confounder]} by {most.separation:.1f} times the noise."
 
 
 def of_the_preset(findings: Findings, effect: EffectFinding) -> str:

@@ -62,10 +62,9 @@ def _remarks(findings: Findings) -> Iterator[str]:
         if one.remark.kind is RemarkKind.COMBINATION:
             blended[frozenset({one.name, *one.remark.others})] = None
         elif one.remark and one.name not in known:
-            measured = one.standard_error is not None
-            yield f"{one.name}: {remark_text(one.remark)}" + (
-                ": known less well than alone." if measured else "; its value is not measured by these runs."
-            )
+            end = ": known less well than alone." if one.remark.kind is RemarkKind.CORRELATED else "."
+            unmeasured = "; its value is not measured by these runs."
+            yield f"{one.name}: {remark_text(one.remark)}{unmeasured if one.standard_error is None else end}"
     order = {one.name: place for place, one in enumerate(findings.after)}
     for group in _connected(blended):
         names = sorted(group, key=lambda name: (order.get(name, len(order)), name))

@@ -16,7 +16,7 @@ from smajax.attribution.reasons import (
     StepDependent,
     UnknownTermLikelier,
 )
-from smajax.report.narrative.values import value_text
+from smajax.report.narrative.values import log_odds_text, value_text
 
 
 def chosen_text(entry: Round) -> str:
@@ -34,7 +34,7 @@ def reason_text(reason: Reason, unit: str, quantity: str, most: int | None = Non
         case StepDependent(effects, kept):
             return f"{effects} keeps {max(kept, 0.0):.0%} of its gain at half the step and is not accepted"
         case LikelierModel(before, log_odds, compared):
-            return f"likelier than {before or 'the base model'} by {log_odds:.1f} in log odds; {_compared(compared, error, most)}"
+            return f"likelier than {before or 'the base model'} by {log_odds_text(log_odds)}; {_compared(compared, error, most)}"
         case NoLikelierModel(compared):
             return f"no other set of effects is likelier; {_compared(compared, error, most)}"
         case PredictsTooLittle(share, least):
@@ -43,11 +43,11 @@ def reason_text(reason: Reason, unit: str, quantity: str, most: int | None = Non
                 "an effect means nothing"
             )
         case NoiseWithoutEffects(log_odds):
-            return f"set aside: what is left without it is noise as well, and the model found is likelier by {log_odds:.1f} in log odds only"
+            return f"set aside: what is left without it is noise as well, and the model found is likelier by {log_odds_text(log_odds)} only"
         case NoiseWithoutRun(run):
             return f"set aside: without {run} what the base model leaves is noise"
         case UnknownTermLikelier(title, log_odds):
-            return f"set aside: {title} alone is likelier than all of them by {log_odds:.1f} in log odds"
+            return f"set aside: {title} alone is likelier than all of them by {log_odds_text(log_odds)}"
         case HeldOutWorse(without, with_it):
             return f"set aside: error on the held-out runs {error(without)} without and {error(with_it)} with it"
 

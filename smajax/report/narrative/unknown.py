@@ -10,12 +10,12 @@ from smajax.attribution.explained_share import EXPLAINED, explained_share
 from smajax.attribution.findings import Findings, UnknownTerm
 from smajax.core.display_units import label
 from smajax.core.wording import per_cent
-from smajax.report.narrative.values import error_text
+from smajax.report.narrative.values import error_text, log_odds_text
 
 
 def comparison_sentence(findings: Findings, term: UnknownTerm) -> str:
     """How a term compares with none."""
-    text = f"{'likelier' if term.log_odds > 0.0 else 'less likely'} than none by {abs(term.log_odds):.1f} in log odds"
+    text = f"{'likelier' if term.log_odds > 0.0 else 'less likely'} than none by {log_odds_text(term.log_odds)}"
     if term.left_out_after is not None:
         text += (
             f"; error on runs left out {error_text(findings, term.left_out_before)} -> "

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 from smajax.attribution.findings import AssumedParameter, Findings, ParameterFinding
-from smajax.core.display_units import digits, display
+from smajax.core.display_units import digits, display, written
+
+MOST_ODDS = math.log(1e6)  # more is as good as certain
 
 
 def value_text(value: float, unit: str, quantity: str) -> str:
@@ -24,10 +28,24 @@ def assumed_text(parameter: AssumedParameter) -> str:
 
 
 def far_text(findings: Findings, parameter: ParameterFinding) -> str:
-    """`3.1 widths of its prior above the middle of that, 75000 MPa`, where it is far; else nothing."""
+    """`3.1 standard deviations above what was known before, 75 GPa`, where it is far; else nothing."""
     base, deviation = parameter.prior_base, parameter.prior_deviation
     if base is None or deviation is None or abs(deviation) <= findings.config.far_from_prior:
         return ""
-    seen, side = display(parameter.unit, parameter.name), "above" if deviation > 0.0 else "below"
-    middle = f"{digits(seen.of(base))} {seen.unit}".strip()
-    return f"{abs(deviation):.1f} widths of its prior {side} the middle of that, {middle}"
+    side = "above" if deviation > 0.0 else "below"
+    return f"{abs(deviation):.1f} standard deviations {side} what was known before, {as_written(parameter, base)}"
+
+
+def as_written(parameter: ParameterFinding, value: float) -> str:
+    """A value of it as an engineer writes it: `75 GPa`."""
+    shown = display(parameter.unit, parameter.name)
+    seen = written(parameter.unit, value) if shown.unit == "MPa" else shown
+    return f"{digits(seen.of(value))} {seen.unit}".strip()
+
+
+def log_odds_text(value: float) -> str:
+    """`5.6 in log odds (270 to 1)`, of its size."""
+    size = abs(value)
+    times = math.exp(min(size, MOST_ODDS))
+    odds = digits(times, 2) if times < 10.0 else f"{float(f'{times:.2g}'):,.0f}"
+    return f"{size:.1f} in log odds ({odds if size < MOST_ODDS else 'more than a million'} to 1)"
