@@ -93,7 +93,7 @@ def test_the_first_example_of_the_readme_prints_the_output_shown(tmp_path: Path)
 def test_an_example_that_begins_says_the_precision(page: Path) -> None:
     """In the single precision of JAX's default a fit is an error and a simulation loses half of its digits."""
     begun = [text for language, _, text, _ in blocks(page) if language == "python" and "import smajax as sma" in text]
-    assert not begun or "prepare()" in begun[0] or "jax_enable_x64" in begun[0]
+    assert not begun or "prepare()" in begun[0]
 
 
 @pytest.mark.slow
@@ -122,7 +122,7 @@ def test_no_page_shows_more_than_twenty_lines_in_a_row(page: Path) -> None:
         code = [
             line
             for line in text.splitlines()
-            if line.strip() and not line.startswith(("import ", "from ", "jax.config"))
+            if line.strip() and not line.startswith(("import ", "from ", "sma.prepare"))
         ]
         assert len(code) <= LINES, text
 
