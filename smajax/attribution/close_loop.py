@@ -287,12 +287,14 @@ def against_an_unknown_term(context: Context, outcome: Outcome) -> Outcome:
     One effect that the library does not have may take several that it has, and together these may come down to the noise.
     """
     setting, base, final = context.setting, outcome.base, outcome.final
-    if not final.effects or (setting.is_noise(final) and len(final.effects) < setting.config.many_effects):
+    explained = setting.is_noise(final)
+    if not final.effects or (explained and len(final.effects) < setting.config.many_effects):
         return outcome
     lacking = in_place_of(setting, base, final, outcome.search.lacking)
     if lacking is not None:
         return replace(outcome, final=base, lacking=lacking, superseded=final.effects)
-    if not setting.predicts(final.left_out_rmse):
+    # Of runs that hardly move, one alone may show what is missing: without it the others are predicted badly, and with it noise is left.
+    if not explained and not setting.predicts(final.left_out_rmse):
         share = max(setting.explained_variance(final.left_out_rmse), 0.0)
         setting.set_aside(final, PredictsTooLittle(share, setting.config.least_explained_variance))
         return replace(outcome, final=base)

@@ -7,7 +7,7 @@ import math
 from functools import cache, partial
 from importlib import import_module
 from types import SimpleNamespace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -311,3 +311,24 @@ def test_one_function_is_asked_for_in_the_place_of_many_effects_or_where_more_th
     assert (ended.lacking is found) is asked
     assert ended.superseded == (tuple(effects) if asked else ())
     assert ended.final is (base if asked else final)
+
+
+@pytest.mark.parametrize("noise", [True, False])
+def test_effects_that_leave_noise_stay_where_runs_left_out_are_predicted_badly(
+    monkeypatch: pytest.MonkeyPatch, noise: bool
+) -> None:
+    """A spring that friction holds hardly moved but in one run: friction and convection left noise, were in truth what was missing, and went."""
+    monkeypatch.setattr(close_loop, "in_place_of", lambda *_: None)
+    reasons: list[Any] = []
+    setting: Any = SimpleNamespace(
+        config=AttributionConfig(),
+        is_noise=lambda _: noise,
+        predicts=lambda _: False,
+        explained_variance=lambda _: 0.47,
+        set_aside=lambda _, reason: reasons.append(reason),
+    )
+    base, final = (SimpleNamespace(effects=tuple(names), left_out_rmse=1.0) for names in ("", "ab"))
+    outcome = Outcome(SimpleNamespace(lacking=None), base, final)  # type: ignore[arg-type]
+    ended = close_loop.against_an_unknown_term(SimpleNamespace(setting=setting), outcome)  # type: ignore[arg-type]
+    assert ended.final is (final if noise else base)
+    assert len(reasons) == (0 if noise else 1)
