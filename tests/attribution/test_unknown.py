@@ -329,6 +329,6 @@ def test_effects_that_leave_noise_stay_where_runs_left_out_are_predicted_badly(
     )
     base, final = (SimpleNamespace(effects=tuple(names), left_out_rmse=1.0) for names in ("", "ab"))
     outcome = Outcome(SimpleNamespace(lacking=None), base, final)  # type: ignore[arg-type]
-    ended = close_loop.against_an_unknown_term(SimpleNamespace(setting=setting), outcome)  # type: ignore[arg-type]
+    ended = close_loop.against_an_unknown_term(SimpleNamespace(setting=setting), outcome)
     assert ended.final is (final if noise else base)
     assert len(reasons) == (0 if noise else 1)
