@@ -211,7 +211,13 @@ def carried_over(old: tomlkit.TOMLDocument, new: tomlkit.TOMLDocument) -> None:
             for what in ("unit", "noise", "reversed", "missing", "offset"):
                 if what in before:
                     after[what] = before[what]
-    for name in ("time", "sampling"):
+    counted = old.get("time", {}).get("kind") == "sample"
+    if counted and "time" in new:  # the one says what the other means
+        new["time"] = old["time"]
+        new.pop("sampling", None)
+        if "sampling" in old:
+            new["sampling"] = old["sampling"]
+    for name in () if counted else ("time", "sampling"):
         if name in old and name in new and old[name] != new[name]:
             new[name] = old[name]
     if "decimal" in old.get("data", {}):  # its folder is that of the logs now

@@ -15,8 +15,8 @@ def _numbers(values: np.ndarray) -> list[float | None]:
     return [None if not np.isfinite(one) else float(f"{one:.6g}") for one in values]
 
 
-def series(table: Table, key: str | int, unit: str) -> dict[str, Any]:
-    """One column of a log against time: {x, y, name, unit, x_name}. Raises MeasuredDataError for a column that is not there."""
+def series(table: Table, key: str | int, unit: str, step: float | None = None) -> dict[str, Any]:
+    """One column of a log against time: {x, y, name, unit, x_name}. step: s between samples that are counted, where the experiment file says it. Raises MeasuredDataError for a column that is not there."""
     from smajax.report.pictures import extremes
 
     name = table.name_of(key)
@@ -25,13 +25,13 @@ def series(table: Table, key: str | int, unit: str) -> dict[str, Any]:
     values = np.asarray(table.columns[name], dtype=float)
     time = time_of(table, name)
     counted = time is None or time.shape != values.shape
-    at = np.arange(values.size, dtype=float) if counted or time is None else time
+    at = np.arange(values.size, dtype=float) * (step or 1.0) if counted or time is None else time
     x, y = extremes(at, values)
     return {
         "x": _numbers(x),
         "y": _numbers(y),
         "name": str(name),
         "unit": unit,
-        "x_name": "sample" if counted else "time",
-        "x_unit": "" if counted else "s",
+        "x_name": "sample" if counted and step is None else "time",
+        "x_unit": "" if counted and step is None else "s",
     }

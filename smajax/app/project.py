@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -15,6 +16,7 @@ from smajax.app.jobs import Job, last_job
 from smajax.app.log_files import Log, found_in, log_of, stamp
 from smajax.app.ready import loaded, ready
 from smajax.core.names import listed
+from smajax.core.units import UnitError, parse_quantity
 from smajax.data.experiment.data_folder import data_folder
 from smajax.data.experiment.errors import ExperimentError
 from smajax.data.experiment.record import Experiment
@@ -93,6 +95,16 @@ class Project:
             return read_schema(self.path) if self.text else None
         except ExperimentError:
             return None
+
+    @property
+    def counted_step(self) -> float | None:
+        """s between samples that are counted, where the file says it."""
+        file = self.file
+        if file is None or file.time is None or file.time.kind != "sample" or file.sampling is None:
+            return None
+        with suppress(UnitError):
+            return parse_quantity(file.sampling.step, "s")
+        return None
 
     @cached_property
     def examined(self) -> Examined:

@@ -201,7 +201,7 @@ class Server:
         key = int(key) if str(key).isdigit() else key
         try:
             table = table_of(project.log_at(query.get("log", "")), project.decimal)
-            return JSONResponse(series(table, key, query.get("unit", "")), headers=HEADERS)
+            return JSONResponse(series(table, key, query.get("unit", ""), project.counted_step), headers=HEADERS)
         except MeasuredDataError as error:
             return JSONResponse({"error": str(error)}, 422, HEADERS)
 

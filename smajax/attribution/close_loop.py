@@ -82,7 +82,7 @@ def close_loop(  # keywords, which a caller names one by one
     """
     if jnp.zeros(()).dtype != jnp.float64:
         raise ValueError(
-            "close_loop needs float64, but JAX runs in float32. Call `jax.config.update('jax_enable_x64', True)` first."
+            "close_loop needs float64, but JAX runs in float32. Call `smajax.prepare()` first, before any array of JAX."
         )
     for name, given in (("compile_per_model", compile_per_model), ("apart", apart)):
         if given is not None:

@@ -109,7 +109,7 @@ class Statistics:
 def set_up(experiment: Experiment, options: Options) -> Setup:
     """The problems of the experiment; raises ValueError for what cannot be fitted or was not fitted."""
     if jnp.zeros(()).dtype != jnp.float64:
-        raise ValueError("identify needs float64: call `jax.config.update('jax_enable_x64', True)` first.")
+        raise ValueError("identify needs float64: call `smajax.prepare()` first, before any array of JAX.")
     fit_runs = [run for run in experiment.runs if run.role == "fit"]
     unknowns = free_by_name(experiment, fit_runs)
     if options.profiled and options.robust:

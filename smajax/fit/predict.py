@@ -55,7 +55,7 @@ def predict(  # keywords, which a caller names one by one
     ExperimentError for what cannot be read or is of another load.
     """
     if jnp.zeros(()).dtype != jnp.float64:
-        raise ValueError("predict needs float64: call `jax.config.update('jax_enable_x64', True)` first.")
+        raise ValueError("predict needs float64: call `smajax.prepare()` first, before any array of JAX.")
     if isinstance(runs, Experiment):
         return _prediction(model, runs)
     paths = [Path(runs)] if isinstance(runs, str | Path) else [Path(one) for one in runs]

@@ -135,8 +135,9 @@ def index_page(rows: Sequence[ReportRow], messages: Sequence[str] = (), steps: S
     """The page; its links are relative to the folder that was searched. steps: what a reader may do next."""
     counts: dict[str, int] = {}
     for row in rows:
-        counts[row.verdict] = counts.get(row.verdict, 0) + 1
-    summary = ", ".join(f"{count} {verdict}" for verdict, count in sorted(counts.items(), key=lambda one: -one[1]))
+        said = verdict_text(row.verdict, (), (), row.doubt)
+        counts[said] = counts.get(said, 0) + 1
+    summary = "; ".join(f"{count} {verdict}" for verdict, count in sorted(counts.items(), key=lambda one: -one[1]))
     links = [quote(f"{row.folder}/{PAGE}") for row in rows]
     parts = [
         MARK,

@@ -26,7 +26,7 @@ def chosen(only: str, strengths: Sequence[float], nulls: int, part: tuple[int, i
     """The cases asked for, in their order. `nulls`: of each rig at most."""
     seen: Counter[str] = Counter()
     found = []
-    for case in cases(drawn, [one for one in strengths if one not in STRENGTHS]):
+    for case in cases(drawn, [one for one in dict.fromkeys(strengths) if one not in STRENGTHS]):
         if only not in case.name or (case.kind != "null" and strengths and case.strength not in strengths):
             continue
         seen[f"{case.rig} {case.kind}"] += 1
@@ -78,6 +78,8 @@ def main() -> None:
     from smajax.core.runtime import prepare
 
     prepare()
+    if any(one <= 0.0 for one in asked.strength):
+        parser.error("--strength: got 0 or less, expected noises above 0")
     first, _, of = asked.part.partition("/")
     todo = chosen(asked.only, asked.strength, asked.nulls, (int(first), int(of)), asked.drawn)
     judged = asked.out / "judged"

@@ -141,9 +141,12 @@ def confusion(cases: Sequence[Judged]) -> tuple[list[str], list[str], np.ndarray
 
 def power(cases: Sequence[Judged]) -> list[tuple[str, str, str, str, str]]:
     """(strength, cases, not called adequate, right equation, right effect) of single effects of the library."""
+    single = [one for one in cases if one.kind == "single"]
+    by_size = [(size, [one for one in _usual(single) if strength_of(one) == size]) for size in STRENGTHS]
+    # What was asked for beside these is weaker than any of them, or counts by what was asked for.
+    asked = sorted({one.asked for one in single} - {one.asked for one in _usual(single)})
     found = []
-    for size in STRENGTHS:
-        own = [one for one in cases if one.kind == "single" and strength_of(one) == size]
+    for size, own in [*((size, [one for one in single if one.asked == size]) for size in asked), *by_size]:
         found.append(
             (
                 f"{size:g}",
@@ -154,6 +157,11 @@ def power(cases: Sequence[Judged]) -> list[tuple[str, str, str, str, str]]:
             )
         )
     return found
+
+
+def _usual(cases: Sequence[Judged]) -> list[Judged]:
+    """Those at the strengths of which the bars speak."""
+    return [one for one in cases if one.asked in (0.0, *STRENGTHS)]
 
 
 def missed(cases: Sequence[Judged]) -> list[Judged]:
@@ -171,7 +179,8 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def text(cases: Sequence[Judged]) -> str:
-    """All tables, Markdown."""
+    """All tables, Markdown. Single effects at further strengths are in the table of power alone."""
+    every, cases = cases, _usual(cases)
     rows, columns, counts = confusion(cases)
     matrix = [[name, *(str(count or "") for count in line)] for name, line in zip(rows, counts, strict=True)]
     listed = [
@@ -195,12 +204,12 @@ def text(cases: Sequence[Judged]) -> str:
     )
     return "\n\n".join(
         [
-            f"{len(cases)} cases.",
+            f"{len(every)} cases.",
             _table(("bar", "asked", "measured"), bars(cases)),
             "Equation named (columns) for the equation that lacks something (rows); single effects, foreign ones and nulls:",
             _table(("", *columns), matrix),
             "Power by strength, in noises left after a refit of the base model:",
-            _table(("strength", "cases", "seen", "right equation", "right effect or named beside it"), power(cases)),
+            _table(("strength", "cases", "seen", "right equation", "right effect or named beside it"), power(every)),
             held,
             "Cases behind the bars that were missed:" if listed else "",
             _table(("case", "strength", "counted as", "verdict", "added", "held-out error / noise"), listed)
@@ -259,5 +268,5 @@ def written(cases: Sequence[Judged], out: Path) -> str:
     """Tables as results.md and the picture as results.png in `out`; the tables."""
     found = text(cases)
     replace(out / "results.md", found + "\n")
-    picture(cases, out / "results.png")
+    picture(_usual(cases), out / "results.png")
     return found

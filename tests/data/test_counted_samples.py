@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.io
 
 from smajax.data.experiment.draft import draft
 from smajax.data.experiment.errors import ExperimentError
 from smajax.data.experiment.load import load_experiment
 from smajax.data.model_catalogue import CATALOGUE
+from smajax.data.model_file.of_presets import model_of_presets
+from smajax.data.model_file.read import load_model
+from smajax.data.model_file.read_logs import read_logs
+from smajax.data.model_file.record import ModelOutput
+from smajax.data.model_file.write import model_text
 
 SPRING = """
 [model]
@@ -71,3 +78,62 @@ def test_a_draft_asks_for_the_time_between_samples(bench: Path) -> None:
     assert asked in drafted.text
     bench.write_text(drafted.text.replace("# [sampling]\n# step", "[sampling]\nstep"))
     assert load_experiment(bench, CATALOGUE).step == 0.05
+
+
+def test_a_signal_with_times_of_its_own_keeps_them(bench: Path) -> None:
+    """A MATLAB structure beside a text file without a time."""
+    volts = np.repeat([0.0, 6.0, 0.0], 400)
+    record = {"time": 0.01 * np.arange(volts.size), "signals": {"values": volts}, "blockName": "m"}
+    scipy.io.savemat(bench.parent / "u.mat", {"U": record})
+    text = SPRING.format(sampling='[sampling]\nstep = "100 ms"').replace('column = "voltage_V"', 'variable = "U"')
+    bench.write_text(text.replace('file = "a.csv"', 'files = { voltage = "u.mat", position = "a.csv" }'))
+    (run,) = load_experiment(bench, CATALOGUE).runs
+    np.testing.assert_allclose(run.time[-1], 11.9)
+    np.testing.assert_allclose(run.inputs["voltage"][[39, 40, 79, 80]], [0.0, 6.0, 6.0, 0.0], atol=1e-9)
+
+
+COUPON = """
+[model]
+wire = "flexinol_table_3_2"
+load = "coupon"
+drive = "none"
+[time]
+kind = "sample"
+[sampling]
+step = "30 s"
+[channels.temperature]
+role = "input"
+column = "T_degC"
+unit = "degC"
+[channels.stress]
+role = "input"
+column = "stress_MPa"
+unit = "MPa"
+[channels.strain]
+role = "output"
+column = "strain_1"
+unit = "1"
+noise = "0.0001 1"
+[[runs]]
+name = "a"
+role = "fit"
+file = "a.csv"
+"""
+
+
+@pytest.mark.parametrize("heading", ["T_degC,stress_MPa,strain_1", "temperature_degC,sigma_MPa,eps_1"])
+def test_a_log_that_is_predicted_has_the_models_time_between_samples(tmp_path: Path, heading: str) -> None:
+    """Whether its columns have the names of the model's logs or are guessed."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 120)
+    rows = np.stack([25.0 + 60.0 * np.abs(np.sin(turn)), 150.0 + turn, 0.02 + 0.02 * np.cos(2.0 * turn)], axis=1)
+    for name, columns in (("a", "T_degC,stress_MPa,strain_1"), ("b", heading)):
+        np.savetxt(tmp_path / f"{name}.csv", rows, delimiter=",", header=columns, comments="")
+    (tmp_path / "experiment.toml").write_text(COUPON)
+    fitted = load_experiment(tmp_path / "experiment.toml", CATALOGUE)
+    outputs = (ModelOutput("strain", "-", 1e-4, False),)
+    model = model_of_presets("flexinol_table_3_2", "coupon", "none")
+    kept = dataclasses.replace(model, log_format=fitted.log_format, outputs=outputs)
+    (tmp_path / "model.toml").write_text(model_text(kept))
+    found, _ = read_logs(load_model(tmp_path / "model.toml"), [tmp_path / "b.csv"])
+    assert (found.step, found.clocked) == (30.0, True)
+    np.testing.assert_allclose(found.runs[0].time[-1], 30.0 * 119)

@@ -81,6 +81,7 @@ def page(project: Project) -> Mapping[str, Any]:
         "units": UNITS,
         "channels": file.channels if file else {},
         "clock": file.sampling.step if file and file.sampling else "",
+        "counted": bool(file and file.time and file.time.kind == "sample"),
         "offset": file.nuisance.offset if file else False,
         "others": [run for run in (file.runs if file else []) if run.columns],
     }

@@ -99,12 +99,14 @@ def _position(setup: _Setup, values: dict[str, Scalar]) -> dict[str, Any]:
     return {"position": stored_loop(_loop(setup, values)).run.position}
 
 
-def _run(function: Function, setup: LoopSetup, rows: np.ndarray, progress: Progress) -> Any:
+def _run(
+    function: Function, setup: LoopSetup, rows: np.ndarray, progress: Progress, numbers: np.ndarray | None = None
+) -> Any:
     time, key = clock(setup.seconds, setup.dt), jax.random.key(setup.seed)
     fixed = (setup.main_gain, setup.perturbation)
     common = _Setup(setup.system, setup.controller, time, setup.interface, key, setup.integration, *fixed)
     columns = dict(zip((*setup.perturbation.columns, TARGET, GAIN), rows.T, strict=True))
-    axes = zipped({**columns, NUMBER: np.arange(len(rows))})
+    axes = zipped({**columns, NUMBER: np.arange(len(rows)) if numbers is None else numbers})
     count = -(-len(rows) // CHUNK)
     results = []
     with closing(chunks(function, common, axes, min(CHUNK, len(rows)), range(count))) as coming:
@@ -114,9 +116,11 @@ def _run(function: Function, setup: LoopSetup, rows: np.ndarray, progress: Progr
     return jax.tree.map(lambda *leaves: np.concatenate(leaves), *results)
 
 
-def closed_loops(setup: LoopSetup, rows: np.ndarray, progress: Progress = quiet) -> Outcome:
-    """Run every row of `grid.loop_rows`, on all devices; trajectories are not stored."""
-    whole = _run(_merits, setup, rows, progress)
+def closed_loops(
+    setup: LoopSetup, rows: np.ndarray, progress: Progress = quiet, numbers: np.ndarray | None = None
+) -> Outcome:
+    """Run every row of `grid.loop_rows`, on all devices; trajectories are not stored. numbers: (L,), of each loop, by which it draws its noise; its place, by default."""
+    whole = _run(_merits, setup, rows, progress, numbers)
     return Outcome(whole["merits"], whole["failed_at"])
 
 

@@ -40,6 +40,7 @@ LINES = (0.5, 0.8, 1.0, 1.25, 2.0)  # ratios of which the angle over time is sto
 LINE_TARGET = 40.0  # deg, of the arm
 # What lies between plant and controller where nobody says another: a filter of noisy, counted readings, and a delay; or nothing.
 FILTER, DELAY = "adaptive", 1
+UNPERTURBED = 2**30  # number of the first loop on the unperturbed plant beside a batch
 TRUE_STATE: Mapping[str, Any] = MappingProxyType({"estimator": "", "noise": 0.0, "quantum": 0.0, "delay": 0})
 CACHED = f"finished/*-{'[0-9a-f]' * 16}.npz"  # files of the cache, below the folder of the sweep
 WITH_LEAST_TIMES = "with least times"
@@ -352,17 +353,21 @@ def _computed(
         interface_of(plant, *between, settings.delay, settings.quantum),
         perturbation=plants.perturbation,
     )
-    # One batch, one program. The unperturbed plant first: the noise of a loop goes by its row, and not by how many plants follow.
-    whole = np.concatenate([loop_rows({}, grid.targets, plants=plants), grid.rows()])
+    # One batch, one program.
+    whole = np.concatenate([grid.rows(), loop_rows({}, grid.targets, plants=plants)])
     setup, error = integrated_setup(setup, whole, settings.tolerance)
-    outcome = closed_loops(setup, whole, relabelled)
+    # A loop draws its noise by its number: that of the unperturbed plant is not to go by how many plants a batch has.
+    numbers = np.arange(len(whole))
+    if grid.numbered:
+        numbers[grid.size :] += UNPERTURBED - grid.size
+    outcome = closed_loops(setup, whole, relabelled, numbers)
     angles: Sequence[np.ndarray] = ()
     if lined:
         target = line_target(plant, grid)
         ratios = np.asarray(settings.line_ratios)
         rows = np.concatenate([loop_rows({one: ratios}, target, plants=plants) for one in lined])
         angles = list(positions(setup, rows).reshape(len(lined), len(LINES), -1))
-    nominal, inside = slice(len(grid.targets)), slice(len(grid.targets), None)
+    inside, nominal = slice(grid.size), grid.size + np.arange(len(grid.targets))
     result: dict[str, Any] = {"failed": outcome.failed_at[inside].reshape(grid.shape)}
     result["integration_error"] = np.asarray(json_line(error.record()))
     both = least_times_of(setup, grid, [shared, _limit(system, name, settings).largest])

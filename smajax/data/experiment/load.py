@@ -310,6 +310,7 @@ def experiment_of(path: Path, file: ExperimentFile, catalogue: Catalogue) -> Exp
         inputs_sampled=model.inputs_sampled,
         inputs_squared=model.inputs_squared,
         step=_step(path, file, bool(model.heats)),
+        timed=_has_times(file),
         tables=lru_cache(maxsize=None)(partial(read_table, wanted=_columns(file), decimal=file.data.decimal)),
     )
     runs = [
@@ -368,7 +369,7 @@ def _log_warnings(
     """Of the logs alone, whatever the model. outputs: each with the sigma of its noise at the sensor's own rate."""
     warnings = [text for read in runs for text in run_warnings(read, reading.step)]
     if _has_times(file):
-        warnings += length_warnings(runs, time_unit(file.time))
+        warnings += length_warnings(runs, file.time)
     warnings += heading_warnings(file.channels, file.time)
     for run in file.runs:
         warnings += heading_warnings(*own_columns(reading.path, run, file.channels, file.time), run)

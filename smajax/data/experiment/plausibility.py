@@ -8,8 +8,8 @@ import numpy as np
 
 from smajax.core.wording import and_listed, counted
 from smajax.data.experiment.record import Run
-from smajax.data.experiment.schema import RunSection
-from smajax.data.experiment.signals import ReadRun, Signal
+from smajax.data.experiment.schema import RunSection, TimeSection
+from smajax.data.experiment.signals import ReadRun, Signal, time_unit
 from smajax.data.readers.table import Array
 
 FEW_SAMPLES = 20
@@ -183,9 +183,12 @@ def copy_warnings(runs: Sequence[ReadRun]) -> list[str]:
     return result
 
 
-def length_warnings(runs: Sequence[ReadRun], unit: str) -> list[str]:
-    """Runs of hours. unit: what the file says its time is in, or seconds where the signals carry their own time."""
+def length_warnings(runs: Sequence[ReadRun], time: TimeSection | None) -> list[str]:
+    """Runs of hours. time: where the file says that it is; None where the signals carry their own."""
+    unit = time_unit(time)
     question = "is the time in ms?" if unit == "s" else f"is the time in {unit}, as [time] says?"
+    if time is not None and time.kind == "sample":
+        question = "is the step under [sampling] the time from one sample to the next?"
     lengths = {read.run.name: read.run.time[-1] - read.run.time[0] for read in runs}
     return [
         f"run {name!r} lasts {length:.5g} s; {question}" for name, length in lengths.items() if length > LONGEST_RUN

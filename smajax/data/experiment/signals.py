@@ -73,7 +73,7 @@ class Reading:
     """What is common to the runs of one experiment file: where to look and what to turn it into.
 
     units: channel or input -> the program's own unit. inputs_sampled, inputs_squared: see ModelDescription. tables: reads a file, once however often it is asked for.
-    others: whether logs of other runs have these columns.
+    timed: whether samples have times. others: whether logs of other runs have these columns.
     """
 
     path: Path
@@ -85,6 +85,7 @@ class Reading:
     inputs_sampled: frozenset[str]
     inputs_squared: frozenset[str]
     step: float
+    timed: bool
     tables: Callable[[Path], Table]
     others: bool = False
 
@@ -132,9 +133,9 @@ def _signal(
     own_unit: str,
     time: TimeSection | None,
     taken: Collection[str | int],
-    step: float,
+    step: float | None,
 ) -> Signal:
-    """One channel from its table. taken: the columns of the time and the other channels. step: s between samples that are counted. Raises MeasuredDataError."""
+    """One channel from its table. taken: the columns of the time and the other channels. step: s between samples that are counted; None where nothing says it. Raises MeasuredDataError."""
     try:
         written = table.column(key, taken, gaps=channel.missing == "skip")
         values = convert(written, channel.unit, own_unit)
@@ -152,8 +153,8 @@ def _signal(
     values = -values if channel.reversed else values
     clock = table.clock(key)
     where, unit = f"{table.path}: the time of {key!r}", "s"
-    if time is not None and time.kind == "sample":
-        clock = step * np.arange(values.size, dtype=np.float64)
+    if time is not None and time.kind == "sample" and (clock is None or step is None):
+        clock = (step or 1.0) * np.arange(values.size, dtype=np.float64)
     elif clock is None:
         if time is None or time.column is None:
             raise MeasuredDataError(
@@ -212,7 +213,9 @@ def _read_signals(reading: Reading, run: RunSection) -> tuple[dict[str, Signal],
             table = reading.tables(file)
             try:
                 own_unit, taken = reading.units[name], _taken(reading, name)
-                signals[name] = _signal(table, name, key, channel, own_unit, reading.time, taken, reading.step)
+                signals[name] = _signal(
+                    table, name, key, channel, own_unit, reading.time, taken, reading.step if reading.timed else None
+                )
             except NoColumnError as error:
                 own = TIME if reading.time is not None and error.key == reading.time.column else name
                 hint = f"; where this log alone has another one, write columns = {{ {own} = '...' }} under its [[runs]] in the experiment file"

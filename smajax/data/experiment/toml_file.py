@@ -18,6 +18,9 @@ from smajax.data.experiment.errors import ExperimentError
 
 Quantity = str | float
 LARGEST = 1 << 20  # bytes of a file of settings
+# Part of what the parser says -> what is mostly wrong.
+TEXT = "; text stands in quotation marks, as in unit = 'mm' or step = '50 ms', and true and false are written in small letters"
+MISTAKES = {"Invalid value": TEXT, "Expected newline or end of document after a statement": TEXT}
 LONGEST = 200  # characters of what was got, in a message
 
 
@@ -152,7 +155,7 @@ def read_toml(path: Path, what: str, folder: str = "", hint: str = "") -> dict[s
         # Beside its own error the parser lets through those of numbers too long and of brackets too deep.
         if isinstance(error, ExperimentError):
             raise
-        bare = "; text stands in quotation marks, as in unit = 'mm'" if "Invalid value" in str(error) else ""
+        bare = next((hint for part, hint in MISTAKES.items() if part in str(error)), "")
         raise ExperimentError(path, "", f"is not TOML: {shortened(str(error))}{bare}{hint}") from error
 
 

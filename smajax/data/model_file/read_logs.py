@@ -101,8 +101,11 @@ def _guessed(
     """A draft of an experiment of the model's wire, load and drive. Raises MeasuredDataError."""
     drafted = draft(paths, folder / "logs.toml", "logs", ModelChoice(model.load, model.wire, model.drive), decimal)
     file = validated(paths[0], tomllib.loads(drafted.text), ExperimentFile, {(): ExperimentFile})
-    if model.log_format is not None and model.log_format.sampling is not None and file.sampling is not None:
-        file = file.model_copy(update={"sampling": model.log_format.sampling})
+    known = model.log_format
+    if known is not None and known.sampling is not None:
+        counted = [one.time is not None and one.time.kind == "sample" for one in (file, known)]
+        if file.sampling is not None or all(counted):
+            file = file.model_copy(update={"sampling": known.sampling})
     return file, tuple(message for message in drafted.messages if message not in drafted.of_bench)
 
 

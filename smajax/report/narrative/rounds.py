@@ -43,7 +43,7 @@ def reason_text(reason: Reason, unit: str, quantity: str, most: int | None = Non
                 "an effect means nothing"
             )
         case NoiseWithoutEffects(log_odds):
-            return f"set aside: what is left without it is noise as well, and the model found is likelier by {log_odds_text(log_odds)} only"
+            return f"set aside: what is left without it is noise as well, and the model found is {'likelier' if log_odds >= 0.0 else 'less likely'} by {log_odds_text(log_odds)} only"
         case NoiseWithoutRun(run):
             return f"set aside: without {run} what the base model leaves is noise"
         case UnknownTermLikelier(title, log_odds):

@@ -46,6 +46,8 @@ def as_written(parameter: ParameterFinding, value: float) -> str:
 def log_odds_text(value: float) -> str:
     """`5.6 in log odds (270 to 1)`, of its size."""
     size = abs(value)
+    if math.isnan(size):
+        return "– in log odds"
     times = math.exp(min(size, MOST_ODDS))
     odds = digits(times, 2) if times < 10.0 else f"{float(f'{times:.2g}'):,.0f}"
     return f"{size:.1f} in log odds ({odds if size < MOST_ODDS else 'more than a million'} to 1)"

@@ -49,11 +49,13 @@ UNKNOWN_AT_A_BOUND = {
     Verdict.EXPLAINED: ("Explained, but an unknown ends at a bound. Added", "fair"),
 }
 NOT_CONFIRMED, NOT_EVERY_RUN = "not confirmed", "not on every held-out run"
+NOT_LEFT_OUT = "not on runs that were left out"
 DOUBTFUL = {
     NOT_CONFIRMED: ("Explained on the fit runs, but not confirmed by held-out runs", "fair"),
     NOT_EVERY_RUN: ("Explained on the fit runs, but not on every held-out run", "fair"),
 }
 ADEQUATE_ON_FIT_RUNS = ("Adequate on the fit runs, but not on every held-out run", "fair")
+WITHOUT_EACH_RUN = ("Explained on the fit runs, but without any one of them they are predicted badly", "fair")
 OF_ONE_RUN = ("Explained on the one fit run, and no other run confirms it", "fair")
 
 
@@ -64,11 +66,14 @@ def headline(findings: Findings) -> tuple[str, str]:
     """
     if findings.verdict is Verdict.EXPLAINED and findings.coefficients_at_bounds:
         return AT_A_BOUND
+    why = doubt(findings)
+    if why and findings.verdict is Verdict.ADEQUATE:
+        return ADEQUATE_ON_FIT_RUNS
     if unknowns_at_bounds(findings):
         return UNKNOWN_AT_A_BOUND[findings.verdict]
-    if why := doubt(findings):
-        if findings.verdict is Verdict.ADEQUATE:
-            return ADEQUATE_ON_FIT_RUNS
+    if why == NOT_LEFT_OUT:
+        return WITHOUT_EACH_RUN
+    if why:
         return DOUBTFUL[why] if _held_out(findings) else OF_ONE_RUN
     return MANY_STAND_IN if _stand_in(findings) else VERDICTS[findings.verdict]
 
@@ -77,14 +82,17 @@ def doubt(findings: Findings) -> str:
     """What runs that the fit did not see leave of a model that describes the fit runs to the noise: empty where they confirm it.
 
     `not confirmed` where they are not predicted better than by the base model beyond chance, or where there is one fit run and no
-    other; `not on every held-out run` where one of them is off by more than the fit runs. Of the base model alone only the latter.
+    other; `not on every held-out run` where one of them is off by more than the fit runs. Of the base model alone only the latter. `not on runs that were left out`
+    where no run was held out, and fits without each fit run predict less than half of the motion in it.
     """
     if findings.verdict is Verdict.ADEQUATE:
         return NOT_EVERY_RUN if caveats.held_out_off(findings) else ""
     if findings.verdict is not Verdict.EXPLAINED:
         return ""
     if not _held_out(findings):
-        return NOT_CONFIRMED if findings.fit_runs < 2 else ""
+        if findings.fit_runs < 2:
+            return NOT_CONFIRMED
+        return NOT_LEFT_OUT if findings.explained_variance <= findings.config.least_explained_variance else ""
     if caveats.held_out_comparison(findings) != "better":
         return NOT_CONFIRMED
     return NOT_EVERY_RUN if caveats.held_out_off(findings) else ""
@@ -171,9 +179,9 @@ def _adequate(findings: Findings) -> str:
         return f"Nothing is missing whose trace is larger than the noise: {noise}."
     several = len(off) > 1
     return (
-        f"The fit runs lack nothing: {noise}. But {and_listed([run.name for run in off])}, held out, {'are' if several else 'is'} predicted worse: what shows "
-        f"there does not show in the fit runs, or these do not determine a parameter that matters there. Make {'one of them' if several else 'it'} a fit run "
-        '(role = "fit") and run again.'
+        f"The fit runs lack nothing: {noise}. But of the held-out runs {and_listed([run.name for run in off])} {'are' if several else 'is'} predicted worse: something was "
+        "different then (another day, another state of the wire), or what shows there does not show in the fit runs, or these do not determine a parameter that "
+        f"matters there. If nothing was different, make {'one of them' if several else 'it'} a fit run and hold another one out."
     )
 
 
@@ -254,8 +262,10 @@ def _explained(findings: Findings) -> str:
         off = caveats.held_out_off(findings)
         but = f", but not on {and_listed([run.name for run in off])}, held out: more may be missing" if off else ""
         doubtful = findings.coefficients_at_bounds or unknowns_at_bounds(findings)
-        lacks = "may lack" if doubtful else "lacks"
-        return f"The base model {lacks}: {listed}. With it, what is left on the fit runs is measurement noise{but}."
+        left_out = doubt(findings) == NOT_LEFT_OUT
+        lacks = "may lack" if doubtful or left_out else "lacks"
+        share = f" Fits without each run explain {max(findings.explained_variance, 0.0):.0%} of the motion in it: one run alone may show what is missing, or inputs and outputs do not belong together. Hold a run out."
+        return f"The base model {lacks}: {listed}. With it, what is left on the fit runs is measurement noise{but}.{share if left_out else ''}"
     return (
         f"The base model may lack: {listed}. With it, what is left on the one fit run is measurement noise. No run was "
         "left out or held out, so nothing confirms it."
