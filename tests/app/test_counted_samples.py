@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pytest
 import tomlkit
-
-pytest.importorskip("starlette")
 
 from smajax.app.edit import carried_over
 from smajax.app.plots import series
