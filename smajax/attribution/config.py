@@ -32,7 +32,9 @@ class AttributionConfig:
     least_log_odds: float = 3.0  # of effects over a model that leaves noise without them, from which they are named: twenty times as likely, as a wrong record has to be
 
     # Fits
-    least_explained_variance: float = 0.5  # of the motion in left-out runs; below it the model's effects mean nothing
+    least_explained_variance: float = (
+        0.5  # of the motion in left-out runs; below it effects mean nothing but where they leave noise
+    )
     nudge: float = (
         1e-3  # share of an effect's start value at which its score is taken: at exactly zero some have no slope
     )

@@ -285,7 +285,7 @@ class Search:
         return 1.0 - (left_out_rmse / motion) ** 2 if motion > 0.0 else 1.0
 
     def predicts(self, left_out_rmse: float) -> bool:
-        """Whether a model with that error explains enough of these runs for its effects to mean anything."""
+        """Whether a model with that error explains enough of these runs for its effects to mean anything, where it leaves more than noise."""
         return self.explained_variance(left_out_rmse) > self.config.least_explained_variance
 
 

@@ -92,6 +92,15 @@ def test_a_signal_with_times_of_its_own_keeps_them(bench: Path) -> None:
     np.testing.assert_allclose(run.inputs["voltage"][[39, 40, 79, 80]], [0.0, 6.0, 6.0, 0.0], atol=1e-9)
 
 
+def test_logs_of_two_rates_are_named(bench: Path) -> None:
+    np.savetxt(bench.parent / "v.csv", np.repeat([0.0, 6.0, 0.0], 400), header="voltage_V", comments="")
+    text = SPRING.format(sampling='[sampling]\nstep = "100 ms"')
+    bench.write_text(text.replace('file = "a.csv"', 'files = { voltage = "v.csv", position = "a.csv" }'))
+    said = " ".join(load_experiment(bench, CATALOGUE).warnings)
+    assert "only 11.9 s are common to all signals" in said
+    assert "have these logs the same rate?" in said
+
+
 COUPON = """
 [model]
 wire = "flexinol_table_3_2"

@@ -376,4 +376,4 @@ def _log_warnings(
     warnings += constant_warnings(runs)
     for output, sensor_sigma in outputs:
         warnings += quantum_warning(_of_fit(runs), output.name, sensor_sigma)
-    return warnings + copy_warnings(runs) + common_warnings(runs)
+    return warnings + copy_warnings(runs) + common_warnings(runs, file.time is not None and file.time.kind == "sample")

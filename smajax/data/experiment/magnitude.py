@@ -250,8 +250,13 @@ def _reversed_warnings(following: Mapping[str, Sequence[_Following]], own: str) 
     return message
 
 
-def common_warnings(runs: Sequence[ReadRun]) -> list[str]:
-    """Signals of one run that begin or end at different times: only what all have in common is used."""
+def common_warnings(runs: Sequence[ReadRun], counted: bool) -> list[str]:
+    """Signals of one run that begin or end at different times: only what all have in common is used. counted: whether they have no times of their own."""
+    rate = (
+        "; samples are counted, one step of [sampling] apart in every log: have these logs the same rate?"
+        if counted
+        else ""
+    )
     result = []
     for read in runs:
         used = float(read.run.time[-1] - read.run.time[0])
@@ -261,7 +266,7 @@ def common_warnings(runs: Sequence[ReadRun]) -> list[str]:
         if used < IN_COMMON * longest - (read.run.time[1] - read.run.time[0]):
             result.append(
                 f"run {read.run.name!r}: {name!r} lasts {longest:.4g} s, and only {used:.4g} s are common to all signals; the "
-                "rest is not used"
+                f"rest is not used{rate}"
             )
     return result
 
