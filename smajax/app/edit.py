@@ -211,14 +211,11 @@ def carried_over(old: tomlkit.TOMLDocument, new: tomlkit.TOMLDocument) -> None:
             for what in ("unit", "noise", "reversed", "missing", "offset"):
                 if what in before:
                     after[what] = before[what]
-    counted = old.get("time", {}).get("kind") == "sample"
-    if counted and "time" in new:  # the one says what the other means
-        new["time"] = old["time"]
+    counted = old.get("time", {}).get("kind") == "sample"  # then the one says what the other means
+    if counted and "time" in new:
         new.pop("sampling", None)
-        if "sampling" in old:
-            new["sampling"] = old["sampling"]
-    for name in () if counted else ("time", "sampling"):
-        if name in old and name in new and old[name] != new[name]:
+    for name in ("time", "sampling"):
+        if name in old and ("time" if counted else name) in new and old[name] != new.get(name):
             new[name] = old[name]
     if "decimal" in old.get("data", {}):  # its folder is that of the logs now
         new["data"]["decimal"] = old["data"]["decimal"]

@@ -20,7 +20,7 @@ from smajax.core.units import UnitError, parse_quantity
 from smajax.data.experiment.data_folder import data_folder
 from smajax.data.experiment.errors import ExperimentError
 from smajax.data.experiment.record import Experiment
-from smajax.data.experiment.schema import ExperimentFile, read_schema
+from smajax.data.experiment.schema import ExperimentFile, is_counted, read_schema
 
 EXPERIMENT = "experiment.toml"
 # The page that a command writes into its folder, and its record -> the command.
@@ -100,7 +100,7 @@ class Project:
     def counted_step(self) -> float | None:
         """s between samples that are counted, where the file says it."""
         file = self.file
-        if file is None or file.time is None or file.time.kind != "sample" or file.sampling is None:
+        if file is None or file.sampling is None or not is_counted(file.time):
             return None
         with suppress(UnitError):
             return parse_quantity(file.sampling.step, "s")

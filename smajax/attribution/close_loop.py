@@ -10,7 +10,6 @@ from dataclasses import replace
 from functools import partial, reduce
 from pathlib import Path
 
-import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.assembled_findings import findings_of, known_so_far
@@ -45,6 +44,7 @@ from smajax.core.blas_threads import on_one_blas_thread
 from smajax.core.progress import Progress, Result, Stage, as_progress, quiet, report_warnings
 from smajax.core.provenance import made_with
 from smajax.core.result_cache import ResultCache
+from smajax.core.runtime import require_float64
 from smajax.data.experiment.record import Experiment
 from smajax.fit.identifiability import Checks, TakenAt, identifiability
 from smajax.fit.preset_priors import visible
@@ -80,10 +80,7 @@ def close_loop(  # keywords, which a caller names one by one
     now and then, and after it where other stages follow: findings without a verdict, which say what is still to come; it may return the seconds that what it does beside the search takes. Raises PluginError for an effect of another
     package that changes the model at its base value: every verdict would be wrong.
     """
-    if jnp.zeros(()).dtype != jnp.float64:
-        raise ValueError(
-            "close_loop needs float64, but JAX runs in float32. Call `smajax.prepare()` first, before any array of JAX."
-        )
+    require_float64("close_loop")
     for name, given in (("compile_per_model", compile_per_model), ("apart", apart)):
         if given is not None:
             text = f"`{name}` changes nothing: sets of effects share a program; it goes in version 0.3"

@@ -47,6 +47,16 @@ def prepare(cores: bool = False) -> None:
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
 
 
+def require_float64(what: str) -> None:
+    """Raise ValueError where JAX computes in single precision."""
+    import jax.numpy as jnp
+
+    if jnp.zeros(()).dtype != jnp.float64:
+        raise ValueError(
+            f"{what} needs float64, and JAX computes in float32: call `smajax.prepare()` first, before any array of JAX."
+        )
+
+
 def collect_rarely() -> None:
     """Have Python look for garbage seldom (`RARELY`); of a process of ours alone."""
     gc.set_threshold(*RARELY)

@@ -13,6 +13,7 @@ import numpy as np
 from smajax.core.names import listed
 from smajax.core.progress import Progress, Result, Stage, report_warnings
 from smajax.core.result_cache import ResultCache
+from smajax.core.runtime import require_float64
 from smajax.core.whiteness import LAGS, WHITE, correlation_time, split_runs, whiteness_p_value
 from smajax.data.experiment.record import Experiment, Run, Unknown
 from smajax.fit.experiment_problem import declared_problem, free_by_name
@@ -108,8 +109,7 @@ class Statistics:
 
 def set_up(experiment: Experiment, options: Options) -> Setup:
     """The problems of the experiment; raises ValueError for what cannot be fitted or was not fitted."""
-    if jnp.zeros(()).dtype != jnp.float64:
-        raise ValueError("identify needs float64: call `smajax.prepare()` first, before any array of JAX.")
+    require_float64("identify")
     fit_runs = [run for run in experiment.runs if run.role == "fit"]
     unknowns = free_by_name(experiment, fit_runs)
     if options.profiled and options.robust:

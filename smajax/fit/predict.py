@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.core.parameters import parameter_values
+from smajax.core.runtime import require_float64
 from smajax.data.experiment.errors import ExperimentError
 from smajax.data.experiment.record import Experiment, Output, Run
 from smajax.data.experiment.toml_file import Quantity
@@ -54,8 +55,7 @@ def predict(  # keywords, which a caller names one by one
     An output that has an offset in the model has each run's own, the mean of its residual. Raises ValueError in float32, and
     ExperimentError for what cannot be read or is of another load.
     """
-    if jnp.zeros(()).dtype != jnp.float64:
-        raise ValueError("predict needs float64: call `smajax.prepare()` first, before any array of JAX.")
+    require_float64("predict")
     if isinstance(runs, Experiment):
         return _prediction(model, runs)
     paths = [Path(runs)] if isinstance(runs, str | Path) else [Path(one) for one in runs]

@@ -12,6 +12,7 @@ from smajax.app.project import Project
 from smajax.app.step import FieldError, Sent, Step
 from smajax.data.experiment.column_guess import QUANTITIES, SURE, TIME, columns_of
 from smajax.data.experiment.errors import ExperimentError
+from smajax.data.experiment.schema import is_counted
 from smajax.data.readers.table import MeasuredDataError
 
 OUTPUTS = frozenset(["position", "angle", "force", "strain", "resistance", "temperature", "stress"])
@@ -81,7 +82,7 @@ def page(project: Project) -> Mapping[str, Any]:
         "units": UNITS,
         "channels": file.channels if file else {},
         "clock": file.sampling.step if file and file.sampling else "",
-        "counted": bool(file and file.time and file.time.kind == "sample"),
+        "counted": file is not None and is_counted(file.time),
         "offset": file.nuisance.offset if file else False,
         "others": [run for run in (file.runs if file else []) if run.columns],
     }

@@ -32,7 +32,7 @@ from smajax.data.experiment.plausibility import (
 )
 from smajax.data.experiment.record import Experiment, FromModelFile, Output, Run, Unknown
 from smajax.data.experiment.recorded_ambient import AMBIENT, ambient_warnings
-from smajax.data.experiment.schema import ExperimentFile, noise_example, read_schema
+from smajax.data.experiment.schema import ExperimentFile, is_counted, noise_example, read_schema
 from smajax.data.experiment.shared_columns import check_columns
 from smajax.data.experiment.signals import Reading, ReadRun, read_run, time_unit
 from smajax.data.experiment.unknowns import (
@@ -117,7 +117,7 @@ def _check_runs(path: Path, file: ExperimentFile, model: ModelDescription) -> No
 
 def _has_times(file: ExperimentFile) -> bool:
     """Of its samples: counted ones have times where the file says how far apart they are."""
-    return file.time is None or file.time.kind != "sample" or file.sampling is not None
+    return not is_counted(file.time) or file.sampling is not None
 
 
 def _step(path: Path, file: ExperimentFile, heated: bool) -> float:
@@ -376,4 +376,4 @@ def _log_warnings(
     warnings += constant_warnings(runs)
     for output, sensor_sigma in outputs:
         warnings += quantum_warning(_of_fit(runs), output.name, sensor_sigma)
-    return warnings + copy_warnings(runs) + common_warnings(runs, file.time is not None and file.time.kind == "sample")
+    return warnings + copy_warnings(runs) + common_warnings(runs, is_counted(file.time))

@@ -8,7 +8,7 @@ import numpy as np
 
 from smajax.core.wording import and_listed, counted
 from smajax.data.experiment.record import Run
-from smajax.data.experiment.schema import RunSection, TimeSection
+from smajax.data.experiment.schema import RunSection, TimeSection, is_counted
 from smajax.data.experiment.signals import ReadRun, Signal, time_unit
 from smajax.data.readers.table import Array
 
@@ -187,7 +187,7 @@ def length_warnings(runs: Sequence[ReadRun], time: TimeSection | None) -> list[s
     """Runs of hours. time: where the file says that it is; None where the signals carry their own."""
     unit = time_unit(time)
     question = "is the time in ms?" if unit == "s" else f"is the time in {unit}, as [time] says?"
-    if time is not None and time.kind == "sample":
+    if is_counted(time):
         question = "is the step under [sampling] the time from one sample to the next?"
     lengths = {read.run.name: read.run.time[-1] - read.run.time[0] for read in runs}
     return [

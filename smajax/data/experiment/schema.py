@@ -103,6 +103,11 @@ class TimeSection(Section):
         return self
 
 
+def is_counted(time: TimeSection | None) -> bool:
+    """Whether no column is a time, and samples are counted."""
+    return time is not None and time.kind == "sample"
+
+
 def noise_example(unit: str) -> str:
     """A noise as a file may give it, of a sensor whose readings are in `unit`: 0.01 mm."""
     number = "0.1" if unit in ("deg", "rad", "Pa", "MPa", "degC", "K") else "0.01"

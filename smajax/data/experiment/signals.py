@@ -17,7 +17,7 @@ from smajax.data.experiment.column_overrides import own_columns
 from smajax.data.experiment.errors import ExperimentError, at_key
 from smajax.data.experiment.reading_limits import check_readings
 from smajax.data.experiment.record import Run
-from smajax.data.experiment.schema import ChannelSection, RunSection, TimeSection
+from smajax.data.experiment.schema import ChannelSection, RunSection, TimeSection, is_counted
 from smajax.data.readers.duplicate_times import once
 from smajax.data.readers.noise import detect_quantum
 from smajax.data.readers.resample import resample_input, resample_output, resample_with_gaps, uniform_clock
@@ -153,7 +153,7 @@ def _signal(
     values = -values if channel.reversed else values
     clock = table.clock(key)
     where, unit = f"{table.path}: the time of {key!r}", "s"
-    if time is not None and time.kind == "sample" and (clock is None or step is None):
+    if is_counted(time) and (clock is None or step is None):
         clock = (step or 1.0) * np.arange(values.size, dtype=np.float64)
     elif clock is None:
         if time is None or time.column is None:
@@ -241,7 +241,7 @@ def _digest(files: tuple[Path, ...]) -> str:
 
 def time_unit(time: TimeSection | None) -> str:
     """What a file's times are in, and with them what a bare number in the experiment file is meant in."""
-    return "s" if time is None or time.kind == "sample" else time.unit
+    return "s" if time is None or is_counted(time) else time.unit
 
 
 def _kept(path: Path, run: RunSection, start: float, end: float, unit: str) -> tuple[float, float]:

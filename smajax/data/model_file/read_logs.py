@@ -12,7 +12,7 @@ from smajax.data.experiment.draft_model import ModelChoice
 from smajax.data.experiment.errors import ExperimentError
 from smajax.data.experiment.load import experiment_of
 from smajax.data.experiment.record import Experiment
-from smajax.data.experiment.schema import DataSection, ExperimentFile, LogFormat, ModelSection, RunSection
+from smajax.data.experiment.schema import DataSection, ExperimentFile, LogFormat, ModelSection, RunSection, is_counted
 from smajax.data.experiment.toml_file import Quantity, quantity, validated
 from smajax.data.model_catalogue import CATALOGUE
 from smajax.data.model_file.outputs_there import by_outputs_there, with_outputs_of_model
@@ -102,10 +102,8 @@ def _guessed(
     drafted = draft(paths, folder / "logs.toml", "logs", ModelChoice(model.load, model.wire, model.drive), decimal)
     file = validated(paths[0], tomllib.loads(drafted.text), ExperimentFile, {(): ExperimentFile})
     known = model.log_format
-    if known is not None and known.sampling is not None:
-        counted = [one.time is not None and one.time.kind == "sample" for one in (file, known)]
-        if file.sampling is not None or all(counted):
-            file = file.model_copy(update={"sampling": known.sampling})
+    if known is not None and known.sampling is not None and (file.sampling or is_counted(known.time)):
+        file = file.model_copy(update={"sampling": known.sampling})
     return file, tuple(message for message in drafted.messages if message not in drafted.of_bench)
 
 

@@ -53,9 +53,9 @@ NOT_LEFT_OUT = "not on runs that were left out"
 DOUBTFUL = {
     NOT_CONFIRMED: ("Explained on the fit runs, but not confirmed by held-out runs", "fair"),
     NOT_EVERY_RUN: ("Explained on the fit runs, but not on every held-out run", "fair"),
+    NOT_LEFT_OUT: ("Explained on the fit runs, but without any one of them they are predicted badly", "fair"),
 }
 ADEQUATE_ON_FIT_RUNS = ("Adequate on the fit runs, but not on every held-out run", "fair")
-WITHOUT_EACH_RUN = ("Explained on the fit runs, but without any one of them they are predicted badly", "fair")
 OF_ONE_RUN = ("Explained on the one fit run, and no other run confirms it", "fair")
 
 
@@ -71,10 +71,8 @@ def headline(findings: Findings) -> tuple[str, str]:
         return ADEQUATE_ON_FIT_RUNS
     if unknowns_at_bounds(findings):
         return UNKNOWN_AT_A_BOUND[findings.verdict]
-    if why == NOT_LEFT_OUT:
-        return WITHOUT_EACH_RUN
     if why:
-        return DOUBTFUL[why] if _held_out(findings) else OF_ONE_RUN
+        return DOUBTFUL[why] if _several(findings) else OF_ONE_RUN
     return MANY_STAND_IN if _stand_in(findings) else VERDICTS[findings.verdict]
 
 
@@ -96,6 +94,11 @@ def doubt(findings: Findings) -> str:
     if caveats.held_out_comparison(findings) != "better":
         return NOT_CONFIRMED
     return NOT_EVERY_RUN if caveats.held_out_off(findings) else ""
+
+
+def _several(findings: Findings) -> bool:
+    """Whether a run can be left out, or was held out."""
+    return findings.fit_runs > 1 or _held_out(findings)
 
 
 def _held_out(findings: Findings) -> bool:
@@ -258,7 +261,7 @@ def _partly(findings: Findings) -> str:
 def _explained(findings: Findings) -> str:
     """As sure as the runs allow: one fit run and none held out confirm nothing, and a held-out run that is off says the contrary."""
     listed = and_listed([effect.title for effect in findings.added])
-    if findings.fit_runs > 1 or _held_out(findings):
+    if _several(findings):
         off = caveats.held_out_off(findings)
         but = f", but not on {and_listed([run.name for run in off])}, held out: more may be missing" if off else ""
         doubtful = findings.coefficients_at_bounds or unknowns_at_bounds(findings)
