@@ -26,9 +26,32 @@ def _nodes(times: Vector, delay: float) -> Vector:
     """Times between which the path is straight, `SUBSTEPS` or more a sample, the samples' own among them."""
     even = np.linspace(times[0], times[-1], (times.size - 1) * SUBSTEPS + 1)
     turns = times[times + delay < times[-1]] + delay if delay else times[:0]
-    every = np.sort(np.concatenate([even, turns]))
-    # a turn next to a node is that node
+    return _joined(even, turns)
+
+
+def _joined(nodes: Vector, turns: Vector) -> Vector:
+    """Both in order; a turn next to a node is that node."""
+    every = np.sort(np.concatenate([nodes, turns]))
     return every[np.concatenate([[True], np.diff(every) > NEAR])]
+
+
+def _late(ramp: float, step: float, behind: float, lag: float) -> float:
+    """By how much a late temperature is behind (`behind` before) at the end of a ramp, C."""
+    return ramp * lag + (behind - ramp * lag) * float(np.exp(-step / lag))
+
+
+def _turns_of_late(fine: Vector, path: Vector, lag: float) -> Vector:
+    """Times at which the late temperature turns: where it meets the path, after that has turned. xi is exact only between these."""
+    behind, turns = 0.0, []
+    for k in range(1, fine.size):
+        step = float(fine[k] - fine[k - 1])
+        ramp = float(path[k] - path[k - 1]) / step
+        if behind * ramp < 0:
+            after = lag * float(np.log1p(-behind / (ramp * lag)))
+            if after < step:
+                turns.append(float(fine[k - 1]) + after)
+        behind = _late(ramp, step, behind, lag)
+    return np.asarray(turns)
 
 
 def _left(b: Branch, xi: float, seen: float, stress: float, done: float) -> float:
@@ -52,6 +75,8 @@ def strain(wire: Wire, times: Vector, run: Run, effects: Effects) -> Vector:
     # the oven is read at `times`; a delay means that the wire is behind it, and turns between two of them
     delay = effects.get("input_delay", 0.0)
     fine = _nodes(times, delay)
+    if lag:
+        fine = _joined(fine, _turns_of_late(fine, np.interp(fine - delay, times, run.command), lag))
     path = np.interp(fine - delay, times, run.command)
     xi, done, late = 1.0, 0.0, float(path[0])
     total, creep, kept = 0.0, strains.creep * stress / strains.level, np.zeros(fine.size)
@@ -59,8 +84,7 @@ def strain(wire: Wire, times: Vector, run: Run, effects: Effects) -> Vector:
     for k in range(1, fine.size):
         change, step = float(path[k] - path[k - 1]), float(fine[k] - fine[k - 1])
         if lag:
-            ramp, decay = change / step, float(np.exp(-step / lag))
-            seen = float(path[k]) - ramp * lag + (late - float(path[k - 1]) + ramp * lag) * decay
+            seen = float(path[k]) - _late(change / step, step, float(path[k - 1]) - late, lag)
         else:
             seen = float(path[k])
         sign = (seen > late) - (seen < late)

@@ -69,7 +69,6 @@ def test_an_event_needs_more_evidence_than_a_bench_and_a_bench_more_than_a_mater
         "ambient_drift",
         "draught",
         "input_clock",
-        "input_delay",
         "input_level",
         "load_shift",
         "loose_start",

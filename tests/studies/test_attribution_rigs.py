@@ -232,11 +232,11 @@ def test_states_are_only_those_that_the_effects_need() -> None:
     assert "friction" in Actuator(rig.wire, rig.load(0.0), {"coulomb_friction": 0.1}, 10.0, 7.0, 1e8).names
 
 
-@pytest.mark.parametrize("effects", [{"transformation_drift": 2.0}, {"input_delay": 0.6}])
+@pytest.mark.parametrize("effects", [{"transformation_drift": 2.0}, {"input_delay": 0.6}, {"rate_dependence": 0.17}])
 def test_a_coupons_strain_does_not_depend_on_how_finely_it_is_summed(
     effects: dict[str, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A drift counts what is transformed up to now, and a delayed oven turns between two samples: with four parts a sample both were off by several noises."""
+    """A drift counts what is transformed up to now, and a delayed oven and a late temperature turn between two samples: with four parts a sample they were off by one noise and more."""
     rig = RIGS["coupon"]
     (run,) = (one for one in rig.runs(rig.wire) if one.name == "inner")
     shown = []
