@@ -259,7 +259,7 @@ def with_record_errors(own: Problem, values: np.ndarray, runs: Sequence[str]) ->
     kinds = [kind for kind in KINDS if kind.coefficient in own.per_run.single or _possible(kind, system)]
     fresh = [kind.coefficient for kind in kinds if kind.coefficient not in known]
     whole = with_effects(system, [name.split(".")[0] for name in fresh])
-    start = jnp.concatenate([own.per_run_at(here), jnp.zeros((len(runs), len(fresh)))], axis=1)
+    start = jnp.asarray(np.concatenate([own.per_run_at(here), np.zeros((len(runs), len(fresh)))], axis=1))
     return own.with_system(whole, per_run=PerRun((*known, *fresh), tuple(runs), start, own.per_run.single)), kinds
 
 

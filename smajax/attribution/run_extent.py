@@ -5,7 +5,7 @@ from __future__ import annotations
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.core.parameters import parameters
+from smajax.core.parameters import all_by_numpy, by_numpy, parameters
 from smajax.data.readers.resolution_levels import likeliest_increment
 from smajax.fit.problem import Problem
 from smajax.model.effects.candidate import Extent
@@ -16,15 +16,16 @@ SAME_FORCE = 0.02  # of the force: what it may change by and still be one
 
 def _one_force(problem: Problem, lowest: float, highest: float) -> bool:
     """Whether the load at rest pulls with one force, at both ends of its way and under the inputs of all samples."""
-    load, batch = problem.system.load, problem.batch
+    load, batch = all_by_numpy(problem.system.load), problem.batch
     own = {entry.name for entry in parameters(problem.system).values() if entry.path[0] == "load"}
     if own & {*batch.override_names, *problem.per_run.names}:
         return False  # runs have a load of their own
     mask = batch.measured
     if isinstance(load, AbstractMovingLoad):
+        rest = by_numpy(jnp.asarray(0.0))
         at = [
-            np.broadcast_to(load.resistance(jnp.asarray(end), jnp.asarray(0.0), batch.inputs), mask.shape)
-            for end in (lowest, highest)
+            np.broadcast_to(load.resistance(end, rest, all_by_numpy(batch.inputs)), mask.shape)
+            for end in map(by_numpy, (jnp.asarray(lowest), jnp.asarray(highest)))
         ]
     elif "stress" in batch.inputs:
         at = [np.asarray(batch.inputs["stress"])]

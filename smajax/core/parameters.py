@@ -18,6 +18,7 @@ from smajax.core.names import of_many
 from smajax.core.units import UnitError, parse_quantity
 
 Module = TypeVar("Module", bound=eqx.Module)
+Tree = TypeVar("Tree")
 # Such as +20%, of text that `compose` takes: of a number without a unit it would be read as 0.2.
 _CHANGE = re.compile(r"\s*[+\-\u2212\u00b1]\s*(?:\d+\.?\d*|\.\d+)\s*%\s*")
 
@@ -32,6 +33,11 @@ def by_numpy(values: Any) -> Any:
     if not isinstance(values, jax.Array) or isinstance(values, jax.core.Tracer) or values.committed:
         return values  # what lies on a device by request stays there
     return np.asarray(values)
+
+
+def all_by_numpy(values: Tree) -> Tree:
+    """A model, or inputs, whose known values are numpy's: what of its equations is plain arithmetic compiles nothing for a number or two."""
+    return jax.tree.map(by_numpy, values)
 
 
 def parameter(

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array
 
 from smajax.core.names import listed
-from smajax.core.parameters import parameter_values, parameters, set_parameters
+from smajax.core.parameters import all_by_numpy, by_numpy, parameter_values, parameters, set_parameters
 from smajax.data.experiment.catalogue import Catalogue, CoefficientInfo, ModelDescription, ParameterInfo, Scale
 from smajax.model.effects.candidate import PRIOR_ODDS
 from smajax.model.effects.library import LIBRARY
@@ -66,19 +68,25 @@ def _at(system: System, values: Mapping[str, float]) -> System:
 
 def _scale(system: System) -> Scale:
     """Of a wire all martensite, in still air: tau = rho c_p d / (4 h), T - T_inf = P / (h pi d) at rest (eq. 3.1)."""
+    system = all_by_numpy(system)
     wire, heat = system.wire, system.wire.heat
     martensite, austenite = (
-        resistance_per_metre(wire, (), heat.ambient_temperature, jnp.full((), fraction)) for fraction in (1.0, 0.0)
+        resistance_per_metre(wire, (), heat.ambient_temperature, by_numpy(jnp.asarray(fraction)))
+        for fraction in (1.0, 0.0)
     )
     ohms = sorted(float(one * wire.wire_length) for one in (martensite, austenite))
-    cooling = heat.convection_coefficient * jnp.pi * wire.wire_diameter
+    cooling = heat.convection_coefficient * np.pi * wire.wire_diameter
+
+    @jax.jit  # one program, where each of its operations would be one
+    def rise(given: Mapping[str, Array]) -> Array:
+        return heating_power(system, martensite, given) / cooling
 
     def warming(inputs: Mapping[str, np.ndarray]) -> np.ndarray:
         count = max(map(len, inputs.values()), default=0)
-        # Of a length that many logs share: JAX compiles each of its operations for each.
+        # Of a length that many logs share: JAX compiles it for each.
         more = (1 << max(count - 1, 0).bit_length()) - count
         given = {name: jnp.asarray(np.pad(values, (0, more), mode="edge")) for name, values in inputs.items()}
-        found = np.asarray(heating_power(system, martensite, given) / cooling, dtype=np.float64)
+        found = np.asarray(rise(given), dtype=np.float64)
         return found[:count] if found.ndim else found
 
     values = parameter_values(system.load)

@@ -97,14 +97,19 @@ def candidate_problem(
     if not series:
         return {}, problem
     length = len(next(iter(series[0].values())))
-    blank = jnp.zeros((len(series) * len(batch.outputs), length))
+    blank = np.zeros((len(series) * len(batch.outputs), length))
     # Parameters that a run overrides: as in the first one; those with one value for each run: the mean of them.
-    mean = problem.per_run_at(jnp.asarray(values)).mean(axis=0, keepdims=True)
-    overrides = jnp.repeat(jnp.concatenate([batch.overrides[:1], mean], axis=1), len(series), axis=0)
+    mean = np.asarray(problem.per_run_at(jnp.asarray(values))).mean(axis=0, keepdims=True)
+    overrides = np.repeat(np.concatenate([batch.overrides[:1], mean], axis=1), len(series), axis=0)
     inputs = {name: jnp.asarray(np.stack([one[name] for one in series])) for name in batch.inputs}
     overridden = (*batch.override_names, *problem.per_run.names)
     runs_to_try = RunBatch(
-        inputs, blank, jnp.ones_like(blank), overrides, overridden, batch.dt, batch.outputs, batch.integration
+        inputs,
+        *map(jnp.asarray, (blank, np.ones_like(blank), overrides)),
+        overridden,
+        batch.dt,
+        batch.outputs,
+        batch.integration,
     )
     system = problem.system_at(jnp.asarray(values))
     return candidates, problem.with_system(system, runs_to_try)

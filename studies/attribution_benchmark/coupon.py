@@ -83,10 +83,8 @@ def strain(wire: Wire, times: Vector, run: Run, effects: Effects) -> Vector:
     seen = late
     for k in range(1, fine.size):
         change, step = float(path[k] - path[k - 1]), float(fine[k] - fine[k - 1])
-        if lag:
-            seen = float(path[k]) - _late(change / step, step, float(path[k - 1]) - late, lag)
-        else:
-            seen = float(path[k])
+        behind = _late(change / step, step, float(path[k - 1]) - late, lag) if lag else 0.0
+        seen = float(path[k]) - behind
         sign = (seen > late) - (seen < late)
         old = xi
         for b in pair:

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import jax.numpy as jnp
 
-from smajax.core.parameters import parameter
+from smajax.core.parameters import all_by_numpy, by_numpy, parameter
 from smajax.model.effects.base import AbstractEffect
 from smajax.model.effects.candidate import Actuator, Candidate, Width
 from smajax.model.load.coupon import Coupon
@@ -19,7 +19,7 @@ from smajax.model.wire.wire import Wire
 def _applies(system: Actuator) -> bool:
     if isinstance(system.load, Coupon) and isinstance(system.wire.constitutive.form, RateForm):
         return False
-    hot, cold = (float(_own(system.wire, jnp.asarray(phase, float))) for phase in (0.0, 1.0))
+    hot, cold = (float(_own(all_by_numpy(system.wire), by_numpy(jnp.asarray(phase)))) for phase in (0.0, 1.0))
     return abs(hot - cold) < 1e-6 * cold
 
 
