@@ -23,6 +23,7 @@ ANEW = 100  # of a case's number: by so much cases that are drawn anew differ
 LARGEST_CHANGE = 0.25  # of a base parameter
 LARGEST_SHIFT, LARGEST_WIDTH = 5.0, 0.25  # K of a range; of its width
 LARGEST_SLOPE = 0.1  # of C_A, C_M
+ANY_SIZE = "any"  # in the name of a case whose coefficients are drawn
 ABSORBED_SHARE = 0.3  # of the largest coefficient
 # Pairs of different kinds that a bench may well hold at once.
 PAIRS = (
@@ -56,18 +57,19 @@ COUPON_TRIPLES = (("asymmetric_transformation", "elastic_mismatch", "creep"),)
 
 @dataclass(frozen=True)
 class Case:
-    """One case; `strength` 0: a null, or effects that a refit takes up."""
+    """One case; `strength` 0: a null, or effects that a refit takes up. `sized`: whether coefficients are sought that have the strength, or else drawn in their ranges."""
 
     rig: str
     effects: tuple[str, ...]
     strength: float
     number: int
+    sized: bool = True
 
     @property
     def name(self) -> str:
         """Names its folder and seeds its random numbers."""
         what = "+".join(self.effects) or "null"
-        return f"{self.rig}-{what}-{self.strength:g}-{self.number:02d}"
+        return f"{self.rig}-{what}-{f'{self.strength:g}' if self.sized else ANY_SIZE}-{self.number:02d}"
 
     @property
     def kind(self) -> str:
@@ -127,6 +129,19 @@ def cases(drawn: int = 0, further: Sequence[float] = ()) -> list[Case]:
     return [replace(case, number=case.number + ANEW * drawn) for case in found]
 
 
+def of_any_size(every: Sequence[Case]) -> list[Case]:
+    """Every combination of rig and effects once, with coefficients that are drawn; nulls as they are. Seconds a case, where one of a strength takes minutes."""
+    largest = [case for case in every if case.strength in (0.0, STRENGTHS[-1])]
+    return [replace(case, sized=not case.strength) for case in largest if case.kind != "absorbed"]
+
+
+def _drawn_coefficient(name: str, random: np.random.Generator) -> float:
+    """Evenly in its logarithm, from where a search for a strength begins to the largest."""
+    effect = EFFECTS[name]
+    share = random.uniform(np.log(effect.first / effect.largest), 0.0)
+    return float(effect.largest * np.exp(share))
+
+
 def true_wire(case: Case) -> Wire:
     """The rig's wire with every unknown off its nominal value, and of a fresh case the values of the sheet too."""
     rig, random = RIGS[case.rig], np.random.default_rng([case.seed, 0])
@@ -148,13 +163,17 @@ def true_wire(case: Case) -> Wire:
 
 
 def truth(case: Case) -> Truth:
-    """Wire and coefficients of a case; takes minutes per effect on a rig with a load."""
+    """Wire and coefficients of a case; a strength takes minutes per effect on a rig with a load. Of coefficients that are drawn it is not known (NaN)."""
     rig, wire = RIGS[case.rig], true_wire(case)
     if not case.effects:
         return Truth(case.rig, wire, {}, {}, 0.0)
     if case.kind == "absorbed":
         effects = {name: ABSORBED_SHARE * EFFECTS[name].largest for name in case.effects}
         return Truth(case.rig, wire, effects, {name: Found(c, 0.0, False) for name, c in effects.items()}, 0.0)
+    if not case.sized:
+        random = np.random.default_rng([case.seed, 2])
+        effects = {name: _drawn_coefficient(name, random) for name in case.effects}
+        return Truth(case.rig, wire, effects, {name: Found(c, np.nan, False) for name, c in effects.items()}, np.nan)
     ruler = Ruler(rig, wire, on_the_sheet(rig) if case.fresh else {})
     found = {name: ruler.find(name, case.strength) for name in case.effects}
     effects = {name: f.coefficient for name, f in found.items()}

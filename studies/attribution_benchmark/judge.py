@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -54,7 +55,9 @@ class Judged:
     kind: str  # null, absorbed, single, pair, triple, outside
     rig: str
     asked: float  # noises that the effect leaves after a refit of the base model
-    strength: float  # what it came to: a physical limit may lie below
+    strength: (
+        float  # what it came to: a physical limit may lie below; of drawn coefficients what the loop's own refit leaves
+    )
     truth: tuple[str, ...]  # as the generator calls them
     equations: tuple[str, ...]  # in which they are
     verdict: str
@@ -155,30 +158,37 @@ def kind_of(truth: Mapping[str, Any]) -> str:
     return "outside" if foreign else ("null", "single", "pair", "triple")[len(truth["effects"])]
 
 
+def remaining(error: float) -> float:
+    """What a refit with this error leaves beside the noise, both over the noise."""
+    return math.sqrt(max(error**2 - 1.0, 0.0))
+
+
 def judge(truth: Mapping[str, Any], report: Mapping[str, Any], seconds: float) -> Judged:
     """From truth.json and the report's JSON."""
     noise = report["output"]["noise_sigma"]
     added = tuple(effect["name"] for effect in report["effects"] if effect["added"])
     confounders = [one["confounder"] for one in report["confounders"] if one["weight"] >= CONFUSABLE]
     unknown = [term["equation"] for term in report["unknown"] if _told_among(term, report["unknown"])]
+    before, together = _error(report["runs"], "fit", "before", noise), truth["strength_together"]
+    alone = [one["strength"] for one in truth["effects"].values()]
     return Judged(
         case=truth["case"],
         kind=kind_of(truth),
         rig=truth["rig"],
         asked=truth["strength_asked"],
-        strength=truth["strength_together"],
+        strength=remaining(before) if together is None else together,
         truth=names_of(truth),
         equations=equations_of(truth),
         verdict=report["verdict"],
         added=added,
         named=tuple(dict.fromkeys([*added, *confounders])),
         where=tuple(dict.fromkeys([*(LIBRARY[name].candidate.equation for name in added), *unknown])),
-        fit_before=_error(report["runs"], "fit", "before", noise),
+        fit_before=before,
         fit_after=_error(report["runs"], "fit", "after", noise),
         held_out_before=_error(report["runs"], "held-out", "before", noise),
         held_out_after=_error(report["runs"], "held-out", "after", noise),
         seconds=seconds,
-        weakest=min((float(one["strength"]) for one in truth["effects"].values()), default=0.0),
+        weakest=float("nan") if None in alone else min(map(float, alone), default=0.0),
     )
 
 

@@ -16,17 +16,20 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from studies.attribution_benchmark.cases import STRENGTHS, Case, cases
+from studies.attribution_benchmark.cases import STRENGTHS, Case, cases, of_any_size
 from studies.attribution_benchmark.judge import Judged, judge, load, save
 from studies.attribution_benchmark.tables import written
 from studies.attribution_benchmark.write import write
 
 
-def chosen(only: str, strengths: Sequence[float], nulls: int, part: tuple[int, int], drawn: int = 0) -> list[Case]:
-    """The cases asked for, in their order. `nulls`: of each rig at most."""
+def chosen(
+    only: str, strengths: Sequence[float], nulls: int, part: tuple[int, int], drawn: int = 0, sized: bool = True
+) -> list[Case]:
+    """The cases asked for, in their order. `nulls`: of each rig at most. `sized`: of a strength; else coefficients are drawn."""
     seen: Counter[str] = Counter()
     found = []
-    for case in cases(drawn, [one for one in dict.fromkeys(strengths) if one not in STRENGTHS]):
+    every = cases(drawn, [one for one in dict.fromkeys(strengths) if one not in STRENGTHS])
+    for case in every if sized else of_any_size(every):
         if only not in case.name or (case.kind != "null" and strengths and case.strength not in strengths):
             continue
         seen[f"{case.rig} {case.kind}"] += 1
@@ -74,14 +77,21 @@ def main() -> None:
     parser.add_argument(
         "--drawn", type=int, default=0, help="1, 2, ...: the same cases with other wires, strengths and noise"
     )
+    parser.add_argument(
+        "--any-size",
+        action="store_true",
+        help="coefficients drawn in their ranges, in the place of strengths: quick to write",
+    )
     asked = parser.parse_args()
     from smajax.core.runtime import prepare
 
     prepare()
     if any(one <= 0.0 for one in asked.strength):
         parser.error("--strength: got 0 or less, expected noises above 0")
+    if asked.strength and asked.any_size:
+        parser.error("--any-size: got a --strength as well; expected one of the two")
     first, _, of = asked.part.partition("/")
-    todo = chosen(asked.only, asked.strength, asked.nulls, (int(first), int(of)), asked.drawn)
+    todo = chosen(asked.only, asked.strength, asked.nulls, (int(first), int(of)), asked.drawn, not asked.any_size)
     judged = asked.out / "judged"
     judged.mkdir(parents=True, exist_ok=True)
     for number, case in enumerate(todo, 1):

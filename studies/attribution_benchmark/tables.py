@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from smajax.core.files import replace
-from studies.attribution_benchmark.judge import EQUATIONS, NOTHING, OUTSIDE, REACHED, Judged, called
+from studies.attribution_benchmark.judge import EQUATIONS, NOTHING, OUTSIDE, REACHED, Judged, called, remaining
 from studies.attribution_benchmark.reliability import interval
 
 STRENGTHS = (1.0, 3.0, 10.0)
@@ -31,7 +31,7 @@ def strength_of(one: Judged) -> float:
     if one.several or not np.isfinite(one.fit_before):
         reached = one.strength
     else:
-        reached = min(one.strength, float(np.sqrt(max(one.fit_before**2 - 1.0, 0.0))))
+        reached = min(one.strength, remaining(one.fit_before))
     return _of_size(reached)
 
 

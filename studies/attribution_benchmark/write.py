@@ -127,6 +127,10 @@ def experiment_text(rig: Rig, runs: tuple[Run, ...], known: Collection[str] = ()
     return "\n".join(lines) + "\n"
 
 
+def _known(strength: float) -> float | None:
+    return None if np.isnan(strength) else strength
+
+
 def write(case: Case, out: Path) -> Truth:
     """Write one case; a folder that is there is whole, for it gets its name last."""
     true = truth(case)
@@ -144,14 +148,15 @@ def write(case: Case, out: Path) -> Truth:
         "effects": {
             name: {
                 **asdict(f),
+                "strength": _known(f.strength),
                 "unit": EFFECTS[name].unit,
                 "outside": EFFECTS[name].outside,
                 "group": EFFECTS[name].group,
             }
             for name, f in true.found.items()
         },
-        "strength_asked": case.strength,
-        "strength_together": true.together,
+        "strength_asked": case.strength if case.sized else 0.0,
+        "strength_together": _known(true.together),
         "parameters": {name: getattr(true.wire, name) for name in (*true.rig.unknowns, *on_the_sheet(true.rig))},
         "noise": true.rig.noise,
         "seed": case.seed,

@@ -90,6 +90,17 @@ def test_an_answer_counts_as_right_for_its_effect_and_its_equation(case: str) ->
     assert (one.effect_right, one.equation_right) == (effect, equation)
 
 
+def test_of_drawn_coefficients_the_strength_is_what_a_refit_of_the_base_model_leaves() -> None:
+    told: dict[str, Any] = _truth("pair", {**HEAT, **STRAIN})
+    for one in (told, *told["effects"].values()):
+        one.update({name: None for name in one if name in ("strength", "strength_together")})
+    one = judge(told, _report("explained", ["creep", "latent_heat"]), 1.0)
+    assert one.strength == pytest.approx((one.fit_before**2 - 1.0) ** 0.5)
+    assert not one.full
+    assert not one.short
+    assert one.right
+
+
 def test_each_kind_has_its_right_answer() -> None:
     foreign = _truth("outside", {"convection_regime": "heat"}, outside=True)
     assert judge(_truth("null", {}, strength=0.0), _report("adequate", []), 1.0).right

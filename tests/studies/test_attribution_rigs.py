@@ -12,7 +12,7 @@ import pytest
 
 from studies.attribution_benchmark import coupon
 from studies.attribution_benchmark.actuator import Actuator
-from studies.attribution_benchmark.cases import Case, cases, true_wire, truth
+from studies.attribution_benchmark.cases import Case, cases, of_any_size, true_wire, truth
 from studies.attribution_benchmark.effects import EFFECTS, absorbed, applies
 from studies.attribution_benchmark.kinetics import Curve
 from studies.attribution_benchmark.rigs import RIGS, Rig, actuator_of, show, simulate
@@ -153,6 +153,24 @@ def test_a_case_is_as_strong_as_it_says() -> None:
         assert measured == pytest.approx(strength, rel=0.2)
         # The search begins each refit where the one before came to.
         assert measured == pytest.approx(found.together, rel=0.05)
+
+
+def test_coefficients_of_any_size_lie_in_their_ranges_and_their_strength_is_not_told(tmp_path) -> None:
+    found = of_any_size(cases(1))
+    assert len({(case.rig, case.effects, case.number if not case.effects else 0) for case in found}) == len(found)
+    for case in found[::7]:
+        for name, coefficient in truth(case).effects.items():
+            shares = sorted([EFFECTS[name].first / EFFECTS[name].largest, 1.0])
+            assert shares[0] <= coefficient / EFFECTS[name].largest <= shares[1]
+    case = next(one for one in found if one.effects == ("creep",) and one.rig == "coupon")
+    assert case.name == "coupon-creep-any-102"
+    write(case, tmp_path)
+    told = json.loads((tmp_path / "truth" / f"{case.name}.json").read_text())
+    assert (told["strength_asked"], told["strength_together"], told["effects"]["creep"]["strength"]) == (
+        0.0,
+        None,
+        None,
+    )
 
 
 def test_a_case_is_the_same_each_time(tmp_path) -> None:
