@@ -44,6 +44,7 @@ CERTAIN = 100.0  # nats that the linear model loses without an effect, beyond wh
 UNEXPLAINED = 2.0  # noises that a sample may be off by, from which the likeliest others are fitted beside the effects
 REPLACED = 2  # other effects that are tried in the place of each at the end
 NEIGHBOURS = 12  # of these sets and those without an effect, the likeliest in the linear model
+FAR_OFF = 0.1  # of the stroke: from here on every effect is fitted beside such a model
 AT_ONCE = 2  # sets that add several effects, where no one more makes the model likelier, of the `REACHED` likeliest
 REACHED = 12
 LEAVES_IN_LINEAR = 4.0  # noises, up to which such a set may come down to noise when it is fitted
@@ -230,7 +231,9 @@ def _neighbours(search: JointSearch, linear: LinearModel, present: FittedModel, 
     if error < UNEXPLAINED * search.noise or len(present.effects) >= MANY:
         return near
     beside = [one for one in with_one(here) if np.isfinite(linear.log_evidence(one))]
-    return [*near, *[one for one in beside if _effects(search, one) not in search.fitted][:NEIGHBOURS]]
+    fresh = [one for one in beside if _effects(search, one) not in search.fitted]
+    # A model that does not move as the runs do has derivatives that say nothing of what it lacks.
+    return [*near, *fresh[: NEIGHBOURS if present.rms < FAR_OFF * search.extent.stroke else None]]
 
 
 def _once(search: JointSearch, sets: Iterable[Subset]) -> list[Subset]:

@@ -21,7 +21,7 @@ from smajax.model.system import System, prepared
 from smajax.model.types import Inputs, Scalar, State
 from smajax.simulation.adaptive_steps import advance
 from smajax.simulation.integrate import Carry, Schedule, integrate
-from smajax.simulation.step import step
+from smajax.simulation.step import SHORTEST_PART, step
 
 
 class Integration(eqx.Module):
@@ -38,9 +38,6 @@ class Integration(eqx.Module):
 
 
 ONE_STEP = Integration()
-# Shortest part of a step on either side of a switch of the command. Rounding in a derivative by the length of a step grows as its
-# inverse square: at 1e-6 it is 2e-4 of the derivative.
-SHORTEST_PART = 3e-6
 FIRST_SAMPLES = 10.0  # whose tries the first sample may use
 SAYS_NOTHING = 0.01  # of a step: the next one would grow from there by four at a time
 

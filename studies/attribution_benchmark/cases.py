@@ -13,9 +13,9 @@ import numpy as np
 
 from studies.attribution_benchmark.effects import EFFECTS, absorbed, applies
 from studies.attribution_benchmark.parameters import Wire
-from studies.attribution_benchmark.rigs import RIGS, Rig
+from studies.attribution_benchmark.rigs import RIGS, Rig, show
 from studies.attribution_benchmark.sheet import drawn_about, on_the_sheet
-from studies.attribution_benchmark.strength import Found, Ruler
+from studies.attribution_benchmark.strength import NO_SUCH_WIRE, Found, Ruler
 
 STRENGTHS = (1.0, 3.0, 10.0)  # noises, after a refit
 NULLS = 30  # a rig
@@ -135,6 +135,19 @@ def of_any_size(every: Sequence[Case]) -> list[Case]:
     return [replace(case, sized=not case.strength) for case in largest if case.kind != "absorbed"]
 
 
+def _drawn(case: Case, rig: Rig, wire: Wire) -> dict[str, float]:
+    """Coefficients of the effects, the first that are drawn of which there is such a wire."""
+    random = np.random.default_rng([case.seed, 3])
+    while True:
+        effects = {name: _drawn_coefficient(name, random) for name in case.effects}
+        try:
+            for run in rig.runs(wire):
+                show(rig, wire, run, effects)
+        except NO_SUCH_WIRE:
+            continue
+        return effects
+
+
 def _drawn_coefficient(name: str, random: np.random.Generator) -> float:
     """Evenly in its logarithm, from where a search for a strength begins to the largest."""
     effect = EFFECTS[name]
@@ -171,8 +184,7 @@ def truth(case: Case) -> Truth:
         effects = {name: ABSORBED_SHARE * EFFECTS[name].largest for name in case.effects}
         return Truth(case.rig, wire, effects, {name: Found(c, 0.0, False) for name, c in effects.items()}, 0.0)
     if not case.sized:
-        random = np.random.default_rng([case.seed, 2])
-        effects = {name: _drawn_coefficient(name, random) for name in case.effects}
+        effects = _drawn(case, rig, wire)
         return Truth(case.rig, wire, effects, {name: Found(c, np.nan, False) for name, c in effects.items()}, np.nan)
     ruler = Ruler(rig, wire, on_the_sheet(rig) if case.fresh else {})
     found = {name: ruler.find(name, case.strength) for name in case.effects}

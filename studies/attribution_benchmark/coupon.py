@@ -1,7 +1,7 @@
 """Coupon at constant stress on a prescribed temperature: xi in closed form, its history by the branches.
 
 The rate form (eq. 3.2) at constant stress is strain' = (-theta_T/E(xi) + alpha) T' + eps_L xi'. xi is exact at every
-point of the path; the thermal term is summed over SUBSTEPS points between two samples.
+point of the path; the thermal term and a creep are summed over SUBSTEPS points between two samples.
 """
 
 from __future__ import annotations
@@ -99,8 +99,8 @@ def strain(wire: Wire, times: Vector, run: Run, effects: Effects) -> Vector:
         total += strains.per_fraction(middle, stress, sign) * (xi - old)
         total += strains.softened(old, xi, stress, (path[k] + path[k - 1]) / 2)
         if strains.creep:
-            rate = strains.creep_rate(creep, stress, middle)
-            creep += rate * step
-            total += rate * step
+            grown = strains.crept(creep, stress, middle, step)
+            creep += grown
+            total += grown
         late, kept[k] = seen, total
     return kept[np.searchsorted(fine, times - NEAR)]

@@ -54,7 +54,7 @@ class Judged:
     case: str
     kind: str  # null, absorbed, single, pair, triple, outside
     rig: str
-    asked: float  # noises that the effect leaves after a refit of the base model
+    asked: float  # noises that the effect leaves after a refit of the base model; NaN of drawn coefficients
     strength: (
         float  # what it came to: a physical limit may lie below; of drawn coefficients what the loop's own refit leaves
     )
@@ -175,7 +175,7 @@ def judge(truth: Mapping[str, Any], report: Mapping[str, Any], seconds: float) -
         case=truth["case"],
         kind=kind_of(truth),
         rig=truth["rig"],
-        asked=truth["strength_asked"],
+        asked=float("nan") if truth["strength_asked"] is None else truth["strength_asked"],
         strength=remaining(before) if together is None else together,
         truth=names_of(truth),
         equations=equations_of(truth),

@@ -94,6 +94,10 @@ class Strains:
             strain -= self.residual * sign
         return strain
 
+    def crept(self, creep: float, stress: float, xi: float, seconds: float) -> float:
+        """By how much the delayed strain grows at one fraction."""
+        return self.creep_rate(creep, stress, xi) * CREEP_TIME * -math.expm1(-seconds / CREEP_TIME)
+
     def creep_rate(self, creep: float, stress: float, xi: float) -> float:
         """Rate of the delayed strain, which martensite shows more than austenite, 1/s."""
         return (self.creep * (0.2 + 0.8 * xi) * stress / self.level - creep) / CREEP_TIME

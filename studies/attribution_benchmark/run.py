@@ -91,7 +91,7 @@ def main() -> None:
     if asked.strength and asked.any_size:
         parser.error("--any-size: got a --strength as well; expected one of the two")
     first, _, of = asked.part.partition("/")
-    todo = chosen(asked.only, asked.strength, asked.nulls, (int(first), int(of)), asked.drawn, not asked.any_size)
+    todo = chosen(asked.only, asked.strength, asked.nulls, (int(first), int(of)), asked.drawn, sized=not asked.any_size)
     judged = asked.out / "judged"
     judged.mkdir(parents=True, exist_ok=True)
     for number, case in enumerate(todo, 1):

@@ -155,7 +155,7 @@ def write(case: Case, out: Path) -> Truth:
             }
             for name, f in true.found.items()
         },
-        "strength_asked": case.strength if case.sized else 0.0,
+        "strength_asked": case.strength if case.sized else None,
         "strength_together": _known(true.together),
         "parameters": {name: getattr(true.wire, name) for name in (*true.rig.unknowns, *on_the_sheet(true.rig))},
         "noise": true.rig.noise,

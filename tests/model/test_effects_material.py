@@ -24,6 +24,7 @@ from smajax.model.types import Trajectory
 from smajax.model.wire.laws import under_law
 from smajax.simulation.compiled import simulate_compiled
 from smajax.simulation.simulate import simulate
+from smajax.simulation.steppers import Integration
 from tests.helpers.often import often
 
 NUDGE = AttributionConfig().nudge
@@ -320,6 +321,25 @@ def test_a_lagging_transformation_is_late_by_its_time_constant():
             for one in (plain, run)
         ]
         assert half[1] - half[0] == pytest.approx(towards * tau * rate, abs=1e-3)
+
+
+@pytest.mark.parametrize("tau", [0.03, 0.17, 0.6, 2.0])
+def test_where_a_lagging_transformation_turns_within_a_step_it_turns_exactly(tau: float):
+    """Turned about within the range, at steps of 1 s that the lag is a part of: as with steps 64 times as fine, and the derivative by the lag is that of differences."""
+    corners = (30.0, 88.0, 58.0, 90.0, 55.0, 92.0, 30.0)
+    temperature = np.concatenate([_ramps(low, high, each=31)[1:] for low, high in itertools.pairwise(corners)])
+    inputs = _inputs(temperature=temperature, stress=np.full(temperature.size, 60e6))
+
+    def strain(time_constant: jax.Array | float, substeps: int = 1) -> jax.Array:
+        on = {"lagging_transformation.time_constant": time_constant}
+        late = extended(COUPON, ("lagging_transformation",), on)
+        return simulate(late, inputs, 1.0, integration=Integration(substeps=substeps)).strain
+
+    assert np.ptp(strain(tau)[30:90]) > 2e-3  # it transforms there, both ways
+    assert np.abs(np.asarray(strain(tau) - strain(tau, 64))).max() < 5e-6
+    slope = jax.jacfwd(strain)(jnp.asarray(tau))
+    differences = (strain(tau + 1e-5) - strain(tau - 1e-5)) / 2e-5
+    assert np.abs(np.asarray(slope - differences)).max() < 1e-6 * np.abs(np.asarray(slope)).max()
 
 
 def test_a_lagging_transformation_follows_the_stress_late_too():

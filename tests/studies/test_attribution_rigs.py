@@ -158,7 +158,7 @@ def test_a_case_is_as_strong_as_it_says() -> None:
 def test_coefficients_of_any_size_lie_in_their_ranges_and_their_strength_is_not_told(tmp_path) -> None:
     found = of_any_size(cases(1))
     assert len({(case.rig, case.effects, case.number if not case.effects else 0) for case in found}) == len(found)
-    for case in found[::7]:
+    for case in [one for one in found if one.rig == "coupon"][::4]:
         for name, coefficient in truth(case).effects.items():
             shares = sorted([EFFECTS[name].first / EFFECTS[name].largest, 1.0])
             assert shares[0] <= coefficient / EFFECTS[name].largest <= shares[1]
@@ -250,7 +250,9 @@ def test_states_are_only_those_that_the_effects_need() -> None:
     assert "friction" in Actuator(rig.wire, rig.load(0.0), {"coulomb_friction": 0.1}, 10.0, 7.0, 1e8).names
 
 
-@pytest.mark.parametrize("effects", [{"transformation_drift": 2.0}, {"input_delay": 0.6}, {"rate_dependence": 0.17}])
+@pytest.mark.parametrize(
+    "effects", [{"transformation_drift": 2.0}, {"input_delay": 0.6}, {"rate_dependence": 0.17}, {"creep": 0.01}]
+)
 def test_a_coupons_strain_does_not_depend_on_how_finely_it_is_summed(
     effects: dict[str, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -63,6 +63,20 @@ class LaggingTransformation(AbstractEffect, HistoryTerm, RangeTerm):
         late_temperature, late_stress = self._late(new.temperature, new.stress, old)
         return {LAGGING: late_temperature, LAGGING_STRESS: late_stress}
 
+    def turn_within(self, law: Kinetics, temperature: Scalar, stress: Scalar, old: WireState) -> Scalar:
+        r"""Where the late y meets y, which has turned: $t = \tau \ln[1 - b/(\tau \dot y)]$ with b what it is behind by at the start of the step; 0 where it does not."""
+        lasts, tau = old.history[DURATION], self.time_constant + 1e-15
+
+        def along(slope: Scalar) -> tuple[Scalar, Scalar]:
+            behind = old.temperature - old.history[LAGGING] - (old.stress - old.history[LAGGING_STRESS]) / slope
+            return behind, temperature - old.temperature - (stress - old.stress) / slope
+
+        heating, cooling = along(law.stress_slope_austenite), along(law.stress_slope_martensite)
+        behind, change = (jnp.where(heating[0] > 0.0, *both) for both in zip(heating, cooling, strict=True))
+        turns = behind * change < 0.0
+        ratio = jnp.where(turns, -behind, 0.0) / jnp.where(turns, change * tau / lasts, 1.0)
+        return tau / lasts * jnp.log1p(ratio)
+
     def _behind(self, slope: Scalar, temperature: Scalar, stress: Scalar, old: WireState) -> Scalar:
         """How far y is behind, C."""
         late_temperature, late_stress = self._late(temperature, stress, old)

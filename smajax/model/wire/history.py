@@ -10,6 +10,7 @@ import jax
 import jax.numpy as jnp
 
 from smajax.model.types import Scalar, WireState
+from smajax.model.wire.wire import Kinetics
 
 DURATION = "duration"  # s, of the step that is being made
 TRANSFORMED = "transformed"  # -, sum of all |d xi| so far; 2 a full cycle
@@ -29,6 +30,13 @@ class HistoryTerm(abc.ABC):
     def history_after(self, old: WireState, new: WireState) -> dict[str, Scalar]:
         """The same entries after a step from `old` to `new`, whose strain and own history are not known yet."""
         return {}
+
+    def turn_within(self, law: Kinetics, temperature: Scalar, stress: Scalar, old: WireState) -> Scalar | None:
+        """The share of a step from `old` at which what it carries turns, while both go to these along straight lines; None: it turns with them.
+
+        The phases turn there too. So a coupon's step is made in two parts, to there and from there.
+        """
+        return None
 
 
 def history_at_start(terms: Sequence[HistoryTerm], at: WireState) -> dict[str, Scalar]:
@@ -103,7 +111,7 @@ def following(old: WireState, name: str, before: Scalar, now: Scalar, time_const
     r"""The entry `name` after a step in which what it follows went from `before` to `now`, time constant $\tau$ in s.
 
     Exact for a straight line between the two, $x + (x_{old} - x_{before}) e^{-h/\tau} - (x - x_{before})(1 - e^{-h/\tau})\tau/h$:
-    a lag of a few steps, or of less than one, is as good as a long one. `now` itself at 0 s.
+    its value at the end of a step is as good for a lag of less than one as for a long one; where it turns within says `HistoryTerm.turn_within`. `now` itself at 0 s.
     """
     for entry in (DURATION, name):
         if entry not in old.history:

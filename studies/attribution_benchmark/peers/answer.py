@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from smajax.core.files import json_text, replace
-from studies.attribution_benchmark.judge import Judged, equations_of, kind_of, names_of
+from studies.attribution_benchmark.judge import Judged, equations_of, kind_of, names_of, remaining
 
 
 @dataclass(frozen=True)
@@ -54,12 +54,13 @@ def verdict(one: Answer) -> str:
 
 def judged(truth: Mapping[str, Any], one: Answer, base: Answer) -> Judged:
     """`one` beside the truth; `base`: the refitted base model's answer."""
+    asked, together = truth["strength_asked"], truth["strength_together"]
     return Judged(
         case=truth["case"],
         kind=kind_of(truth),
         rig=truth["rig"],
-        asked=truth["strength_asked"],
-        strength=truth["strength_together"],
+        asked=float("nan") if asked is None else asked,
+        strength=remaining(base.fit_error) if together is None else together,
         truth=names_of(truth),
         equations=equations_of(truth),
         verdict=verdict(one),
