@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import jax
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
@@ -19,6 +19,7 @@ from smajax.model.extended import extended
 from smajax.model.load.coupon import AbstractCoupon
 from smajax.model.presets import DRIVES, LOADS, WIRES, build
 from smajax.model.system import System, heating_power
+from smajax.model.types import Scalar
 from smajax.model.wire.heat import mass_per_metre
 from smajax.model.wire.laws import LAWS
 from smajax.model.wire.order import disorder
@@ -66,10 +67,16 @@ def _at(system: System, values: Mapping[str, float]) -> System:
     return set_parameters(system, {name: value for name, value in values.items() if name in table})
 
 
+@eqx.filter_jit  # one program, where each of its operations would be one
+def _warming(system: System, resistance: Scalar, cooling: Scalar, given: Mapping[str, Array]) -> Array:
+    """By how much a wire gets warmer than the air at rest, K; `resistance` and `cooling` of a metre, ohm and W/K."""
+    return heating_power(system, resistance, given) / cooling
+
+
 def _scale(system: System) -> Scale:
     """Of a wire all martensite, in still air: tau = rho c_p d / (4 h), T - T_inf = P / (h pi d) at rest (eq. 3.1)."""
-    system = all_by_numpy(system)
-    wire, heat = system.wire, system.wire.heat
+    wire = all_by_numpy(system.wire)
+    heat = wire.heat
     martensite, austenite = (
         resistance_per_metre(wire, (), heat.ambient_temperature, by_numpy(jnp.asarray(fraction)))
         for fraction in (1.0, 0.0)
@@ -77,16 +84,12 @@ def _scale(system: System) -> Scale:
     ohms = sorted(float(one * wire.wire_length) for one in (martensite, austenite))
     cooling = heat.convection_coefficient * np.pi * wire.wire_diameter
 
-    @jax.jit  # one program, where each of its operations would be one
-    def rise(given: Mapping[str, Array]) -> Array:
-        return heating_power(system, martensite, given) / cooling
-
     def warming(inputs: Mapping[str, np.ndarray]) -> np.ndarray:
         count = max(map(len, inputs.values()), default=0)
         # Of a length that many logs share: JAX compiles it for each.
         more = (1 << max(count - 1, 0).bit_length()) - count
         given = {name: jnp.asarray(np.pad(values, (0, more), mode="edge")) for name, values in inputs.items()}
-        found = np.asarray(rise(given), dtype=np.float64)
+        found = np.asarray(_warming(system, jnp.asarray(martensite), jnp.asarray(cooling), given), dtype=np.float64)
         return found[:count] if found.ndim else found
 
     values = parameter_values(system.load)

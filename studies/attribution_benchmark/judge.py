@@ -55,9 +55,8 @@ class Judged:
     kind: str  # null, absorbed, single, pair, triple, outside
     rig: str
     asked: float  # noises that the effect leaves after a refit of the base model; NaN of drawn coefficients
-    strength: (
-        float  # what it came to: a physical limit may lie below; of drawn coefficients what the loop's own refit leaves
-    )
+    # What it came to: a physical limit may lie below. Of drawn coefficients what the loop's own refit leaves.
+    strength: float
     truth: tuple[str, ...]  # as the generator calls them
     equations: tuple[str, ...]  # in which they are
     verdict: str

@@ -39,6 +39,23 @@ def _of_size(reached: float) -> float:
     return max([size for size in STRENGTHS if reached >= REACHED * size], default=0.0)
 
 
+def _bars_of_drawn(drawn: Sequence[Judged]) -> list[tuple[str, str, str]]:
+    """Of coefficients that were drawn."""
+    strong = [one for one in drawn if one.strength >= STRENGTHS[1]]
+    return [
+        (
+            "of drawn coefficients: held-out error at most 1.2 times the noise (in the library)",
+            "90 %",
+            share(drawn, lambda one: one.held_out_after <= 1.2),
+        ),
+        (
+            "of drawn coefficients that leave three noises or more: every effect, or named beside it",
+            "–",
+            share(strong, lambda one: one.effect_right),
+        ),
+    ]
+
+
 def bars(cases: Sequence[Judged]) -> list[tuple[str, str, str]]:
     """(what, bar, measured)."""
     nulls = [one for one in cases if one.kind == "null"]
@@ -49,7 +66,6 @@ def bars(cases: Sequence[Judged]) -> list[tuple[str, str, str]]:
     lowered = [one for one in cases if one.kind == "single" and strength_of(one) < _of_size(one.strength)]
     middle = [one for one in cases if one.kind == "single" and strength_of(one) == 3.0]
     outside = [one for one in cases if one.kind == "outside" and strength_of(one) >= 3.0]
-    drawn = [one for one in cases if np.isnan(one.asked) and one.kind != "outside"]
     asked = [one for one in cases if one.kind == "single" and one.asked == 10.0 and one.strength >= REACHED * 10.0]
     return [
         (
@@ -105,16 +121,7 @@ def bars(cases: Sequence[Judged]) -> list[tuple[str, str, str]]:
             "90 %",
             share([*strong, *middle], lambda one: one.held_out_after <= 1.2),
         ),
-        (
-            "of drawn coefficients: held-out error at most 1.2 times the noise (in the library)",
-            "90 %",
-            share(drawn, lambda one: one.held_out_after <= 1.2),
-        ),
-        (
-            "of drawn coefficients that leave three noises or more: every effect, or named beside it",
-            "–",
-            share([one for one in drawn if one.strength >= 3.0], lambda one: one.effect_right),
-        ),
+        *_bars_of_drawn([one for one in cases if np.isnan(one.asked) and one.kind != "outside"]),
         ("a case in under two minutes", "all", share(cases, lambda one: one.seconds < 120.0)),
         ("a case in under three minutes", "all", share(cases, lambda one: one.seconds < 180.0)),
         (

@@ -208,6 +208,7 @@ def test_the_measured_bias_spring_bench_is_partly_explained_within_its_errors(
     values = {one.name: one.value for one in findings.after}
     assert values.get("thermal_modulus", 1.0) < 0.0 or "thermal_expansion" in _added(findings)
     assert all(LIBRARY[name].candidate.prior_class != "event" for name in _added(findings))
+    assert "input_delay" not in _added(findings)
     step = next(run for run in findings.runs if run.name == "Step02")
     _events_of_step02(step.time, {"measured": step.measured, "before": step.before, "after": step.after})
 

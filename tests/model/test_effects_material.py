@@ -330,10 +330,11 @@ def test_where_a_lagging_transformation_turns_within_a_step_it_turns_exactly(tau
     temperature = np.concatenate([_ramps(low, high, each=31)[1:] for low, high in itertools.pairwise(corners)])
     inputs = _inputs(temperature=temperature, stress=np.full(temperature.size, 60e6))
 
+    late = extended(COUPON, ("lagging_transformation",))
+
     def strain(time_constant: jax.Array | float, substeps: int = 1) -> jax.Array:
-        on = {"lagging_transformation.time_constant": time_constant}
-        late = extended(COUPON, ("lagging_transformation",), on)
-        return simulate(late, inputs, 1.0, integration=Integration(substeps=substeps)).strain
+        on = set_parameters(late, {"lagging_transformation.time_constant": time_constant})
+        return simulate(on, inputs, 1.0, integration=Integration(substeps=substeps)).strain
 
     assert np.ptp(strain(tau)[30:90]) > 2e-3  # it transforms there, both ways
     assert np.abs(np.asarray(strain(tau) - strain(tau, 64))).max() < 5e-6

@@ -16,7 +16,8 @@ Equation = Literal["heat", "electrical", "kinetics", "constitutive", "mechanics"
 EQUATIONS: tuple[str, ...] = get_args(Equation)
 
 # material: physics that every wire has. bench: a property that some wires or benches have and others have not (friction,
-# lag, gain, leads, supply, training). event: what happens in some runs, or a wrong record.
+# lag, gain, leads, supply, training). event: what happens in some runs, or a wrong record. A delay of every record is of the bench: loggers that
+# buffer are common. A wrong level or a wrong clock of every record is not, and a delay of one record alone is an event too (`record_fits`).
 PriorClass = Literal["material", "bench", "event"]
 PRIOR_CLASSES: tuple[str, ...] = get_args(PriorClass)
 # Prior odds that the runs of an experiment need one given effect. There are some fifty candidates: with the same odds for

@@ -36,7 +36,6 @@ class InputDelay(AbstractEffect, InputLagTerm):
         needs_time=True,
         similar_group=DELAY,
         applies=_applies,
-        # One delay of every record is how a bench is logged; of one run alone it is an event (`record_fits`).
         prior_class="bench",
         widths={
             "delay": Width(0.03, "buffers of loggers, serial lines and video: a sample to 0.1 s"),
