@@ -13,7 +13,7 @@ model contains the base model. What it may change is said beside each equation, 
 | kinetics: range | `wire.kinetics_terms.RangeTerm` | `heating_distance(law, z, temperature, stress, old)`, `cooling_distance(law, z, temperature, stress, old)` |
 | kinetics: a second part of the wire | `wire.kinetics_terms.PopulationTerm` | `second_conditions()` |
 | constitutive law | `wire.constitutive.ConstitutiveTerm` | `strain(wire, at)`, `modulus_change(wire, fraction)` |
-| any of these, where the path matters | `wire.history.HistoryTerm` | `history_at_start(at)`, `history_after(old, new)` |
+| any of these, where the path matters | `wire.history.HistoryTerm` | `history_at_start(at)`, `history_after(old, new)`, `turn_within(law, temperature, stress, old)` |
 | motion: force | `load.force.ForceTerm` | `resisting_force(load, at)` |
 | motion: friction | `load.friction.FrictionTerm` | `friction_limit(load_at_rest)`, `friction_level(speed)`, `presliding()` |
 | motion: mounting | `load.mounting.MountingTerm` | `loose_length()` |
