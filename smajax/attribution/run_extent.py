@@ -22,11 +22,9 @@ def _one_force(problem: Problem, lowest: float, highest: float) -> bool:
         return False  # runs have a load of their own
     mask = batch.measured
     if isinstance(load, AbstractMovingLoad):
-        rest = by_numpy(jnp.asarray(0.0))
-        at = [
-            np.broadcast_to(load.resistance(end, rest, all_by_numpy(batch.inputs)), mask.shape)
-            for end in map(by_numpy, (jnp.asarray(lowest), jnp.asarray(highest)))
-        ]
+        rest, *ends = by_numpy(jnp.asarray([0.0, lowest, highest]))
+        inputs = all_by_numpy(batch.inputs)
+        at = [np.broadcast_to(load.resistance(end, rest, inputs), mask.shape) for end in ends]
     elif "stress" in batch.inputs:
         at = [np.asarray(batch.inputs["stress"])]
     else:

@@ -78,8 +78,8 @@ def _scale(system: System) -> Scale:
     wire = all_by_numpy(system.wire)
     heat = wire.heat
     martensite, austenite = (
-        resistance_per_metre(wire, (), heat.ambient_temperature, by_numpy(jnp.asarray(fraction)))
-        for fraction in (1.0, 0.0)
+        resistance_per_metre(wire, (), heat.ambient_temperature, fraction)
+        for fraction in by_numpy(jnp.asarray([1.0, 0.0]))
     )
     ohms = sorted(float(one * wire.wire_length) for one in (martensite, austenite))
     cooling = heat.convection_coefficient * np.pi * wire.wire_diameter

@@ -304,8 +304,8 @@ def _in_two_parts(
     if not shares:
         return one(system, state, inputs, dt)
     share = jnp.clip(shares[0], SHORTEST_PART, 1.0 - SHORTEST_PART)
-    before = {"temperature": old.temperature, "stress": old.stress, "strain": -state.motion.position}
-    there = {name: at + share * (end - at) for name, end in inputs.items() for at in (before.get(name, end),)}
+    before = {**inputs, "temperature": old.temperature, "stress": old.stress, "strain": -state.motion.position}
+    there = {name: before[name] + share * (end - before[name]) for name, end in inputs.items()}
     ends = {name: jnp.stack([there[name], jnp.asarray(end, dtype=float)]) for name, end in inputs.items()}
 
     def part(at: State, now: tuple[Scalar, Inputs]) -> tuple[State, None]:

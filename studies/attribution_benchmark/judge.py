@@ -162,20 +162,28 @@ def remaining(error: float) -> float:
     return math.sqrt(max(error**2 - 1.0, 0.0))
 
 
+def asked_and_strength(truth: Mapping[str, Any], fit_before: float) -> tuple[float, float]:
+    """The strength that was asked for and the one that it came to; of drawn coefficients none was, and it is what a refit with this error leaves."""
+    if truth["strength_asked"] is None:
+        return math.nan, remaining(fit_before)
+    return truth["strength_asked"], truth["strength_together"]
+
+
 def judge(truth: Mapping[str, Any], report: Mapping[str, Any], seconds: float) -> Judged:
     """From truth.json and the report's JSON."""
     noise = report["output"]["noise_sigma"]
     added = tuple(effect["name"] for effect in report["effects"] if effect["added"])
     confounders = [one["confounder"] for one in report["confounders"] if one["weight"] >= CONFUSABLE]
     unknown = [term["equation"] for term in report["unknown"] if _told_among(term, report["unknown"])]
-    before, together = _error(report["runs"], "fit", "before", noise), truth["strength_together"]
+    before = _error(report["runs"], "fit", "before", noise)
+    asked, strength = asked_and_strength(truth, before)
     alone = [one["strength"] for one in truth["effects"].values()]
     return Judged(
         case=truth["case"],
         kind=kind_of(truth),
         rig=truth["rig"],
-        asked=float("nan") if truth["strength_asked"] is None else truth["strength_asked"],
-        strength=remaining(before) if together is None else together,
+        asked=asked,
+        strength=strength,
         truth=names_of(truth),
         equations=equations_of(truth),
         verdict=report["verdict"],
@@ -187,7 +195,7 @@ def judge(truth: Mapping[str, Any], report: Mapping[str, Any], seconds: float) -
         held_out_before=_error(report["runs"], "held-out", "before", noise),
         held_out_after=_error(report["runs"], "held-out", "after", noise),
         seconds=seconds,
-        weakest=float("nan") if None in alone else min(map(float, alone), default=0.0),
+        weakest=math.nan if None in alone else min(map(float, alone), default=0.0),
     )
 
 

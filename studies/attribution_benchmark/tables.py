@@ -39,6 +39,10 @@ def _of_size(reached: float) -> float:
     return max([size for size in STRENGTHS if reached >= REACHED * size], default=0.0)
 
 
+def _predicted(one: Judged) -> bool:
+    return one.held_out_after <= 1.2
+
+
 def _bars_of_drawn(drawn: Sequence[Judged]) -> list[tuple[str, str, str]]:
     """Of coefficients that were drawn."""
     strong = [one for one in drawn if one.strength >= STRENGTHS[1]]
@@ -46,7 +50,7 @@ def _bars_of_drawn(drawn: Sequence[Judged]) -> list[tuple[str, str, str]]:
         (
             "of drawn coefficients: held-out error at most 1.2 times the noise (in the library)",
             "90 %",
-            share(drawn, lambda one: one.held_out_after <= 1.2),
+            share(drawn, _predicted),
         ),
         (
             "of drawn coefficients that leave three noises or more: every effect, or named beside it",
@@ -114,12 +118,12 @@ def bars(cases: Sequence[Judged]) -> list[tuple[str, str, str]]:
         (
             "held-out error at most 1.2 times the noise (in the library, 10 times)",
             "all",
-            share(strong, lambda one: one.held_out_after <= 1.2),
+            share(strong, _predicted),
         ),
         (
             "held-out error at most 1.2 times the noise (in the library, 3 times or more)",
             "90 %",
-            share([*strong, *middle], lambda one: one.held_out_after <= 1.2),
+            share([*strong, *middle], _predicted),
         ),
         *_bars_of_drawn([one for one in cases if np.isnan(one.asked) and one.kind != "outside"]),
         ("a case in under two minutes", "all", share(cases, lambda one: one.seconds < 120.0)),

@@ -19,6 +19,11 @@ LAGGING = "lagging_temperature"
 LAGGING_STRESS = "lagging_stress"
 
 
+def _apart(slope: Scalar, at: tuple[Scalar, Scalar], other: tuple[Scalar, Scalar]) -> Scalar:
+    """y of one (temperature, stress) less that of another, C."""
+    return at[0] - other[0] - (at[1] - other[1]) / slope
+
+
 class LaggingTransformation(AbstractEffect, HistoryTerm, RangeTerm):
     r"""$\tau \dot T_k + T_k = T$ and $\tau \dot\sigma_k + \sigma_k = \sigma$, with T_k and sigma_k in both curves.
 
@@ -66,21 +71,17 @@ class LaggingTransformation(AbstractEffect, HistoryTerm, RangeTerm):
     def turn_within(self, law: Kinetics, temperature: Scalar, stress: Scalar, old: WireState) -> Scalar:
         r"""Where the late y meets y, which has turned: $t = \tau \ln[1 - b/(\tau \dot y)]$ with b what it is behind by at the start of the step; 0 where it does not."""
         lasts, tau = old.history[DURATION], self.time_constant + 1e-15
-
-        def along(slope: Scalar) -> tuple[Scalar, Scalar]:
-            behind = old.temperature - old.history[LAGGING] - (old.stress - old.history[LAGGING_STRESS]) / slope
-            return behind, temperature - old.temperature - (stress - old.stress) / slope
-
-        heating, cooling = along(law.stress_slope_austenite), along(law.stress_slope_martensite)
-        behind, change = (jnp.where(heating[0] > 0.0, *both) for both in zip(heating, cooling, strict=True))
+        start, late = (old.temperature, old.stress), (old.history[LAGGING], old.history[LAGGING_STRESS])
+        heats = _apart(law.stress_slope_austenite, start, late) > 0.0
+        slope = jnp.where(heats, law.stress_slope_austenite, law.stress_slope_martensite)
+        behind, change = _apart(slope, start, late), _apart(slope, (temperature, stress), start)
         turns = behind * change < 0.0
         ratio = jnp.where(turns, -behind, 0.0) / jnp.where(turns, change * tau / lasts, 1.0)
         return tau / lasts * jnp.log1p(ratio)
 
     def _behind(self, slope: Scalar, temperature: Scalar, stress: Scalar, old: WireState) -> Scalar:
         """How far y is behind, C."""
-        late_temperature, late_stress = self._late(temperature, stress, old)
-        return late_temperature - temperature - (late_stress - stress) / slope
+        return _apart(slope, self._late(temperature, stress, old), (temperature, stress))
 
     def heating_distance(self, law: Kinetics, z: Scalar, temperature: Scalar, stress: Scalar, old: WireState) -> Scalar:
         return z + self._behind(law.stress_slope_austenite, temperature, stress, old) / heating_width(law)

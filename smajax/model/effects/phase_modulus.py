@@ -19,7 +19,8 @@ from smajax.model.wire.wire import Wire
 def _applies(system: Actuator) -> bool:
     if isinstance(system.load, Coupon) and isinstance(system.wire.constitutive.form, RateForm):
         return False
-    hot, cold = (float(_own(all_by_numpy(system.wire), by_numpy(jnp.asarray(phase)))) for phase in (0.0, 1.0))
+    wire = all_by_numpy(system.wire)
+    hot, cold = (float(_own(wire, phase)) for phase in by_numpy(jnp.asarray([0.0, 1.0])))
     return abs(hot - cold) < 1e-6 * cold
 
 

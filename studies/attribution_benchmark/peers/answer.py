@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from smajax.core.files import json_text, replace
-from studies.attribution_benchmark.judge import Judged, equations_of, kind_of, names_of, remaining
+from studies.attribution_benchmark.judge import Judged, asked_and_strength, equations_of, kind_of, names_of
 
 
 @dataclass(frozen=True)
@@ -54,13 +54,13 @@ def verdict(one: Answer) -> str:
 
 def judged(truth: Mapping[str, Any], one: Answer, base: Answer) -> Judged:
     """`one` beside the truth; `base`: the refitted base model's answer."""
-    asked, together = truth["strength_asked"], truth["strength_together"]
+    asked, strength = asked_and_strength(truth, base.fit_error)
     return Judged(
         case=truth["case"],
         kind=kind_of(truth),
         rig=truth["rig"],
-        asked=float("nan") if asked is None else asked,
-        strength=remaining(base.fit_error) if together is None else together,
+        asked=asked,
+        strength=strength,
         truth=names_of(truth),
         equations=equations_of(truth),
         verdict=verdict(one),
