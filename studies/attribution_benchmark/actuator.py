@@ -152,7 +152,8 @@ class Actuator:
             stress_rate = push + (theta * t_rate - e * eps * xi_rate) / n
         out[0], out[1], out[2] = t_rate, stress_rate, speed
         if "done" in at:
-            out[at["done"]] = abs(xi_rate)
+            # not |xi'|: where the branch is to turn back, that would count as progress and hide it from `_paces`
+            out[at["done"]] = 0.0 if b is None else -b.sign * xi_rate
         if not self.stop:
             out[3] = (self.net_force(s) - load.damping * v) / load.inertia
             if "friction" in at:
