@@ -54,7 +54,7 @@ from smajax.simulation.steppers import Integration
 SEED = 2004
 MOST_SEARCHES = 2  # the first, and again without what the held-out runs rejected
 MOST_RECORD_ERRORS = 2  # of single runs that are corrected: with more of them nothing is left that says which is right
-EVERY, RARELY = 60.0, 8.0  # s before the first page of a search that goes on; times what the last took before the next
+RARELY = 8.0  # times what the last page of a search took before the next
 CHECKING = "checking what these runs determine"
 
 
@@ -168,7 +168,7 @@ def prepared(  # the stage's inputs, each once
 
 def _now_and_then(context: Context, interim: Interim) -> Callable[[JointSearch, FittedModel], None]:
     """What gives `interim` the likeliest model after a round, so seldom that it takes a small part of the time."""
-    began, cost = clock.monotonic(), EVERY / RARELY
+    began, cost = clock.monotonic(), context.setting.config.first_page / RARELY
 
     def after_round(search: JointSearch, best: FittedModel) -> None:
         nonlocal began, cost

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class AttributionConfig:
-    """What `close_loop(..., config=...)` changes. Shares are 0..1; nothing here has a unit."""
+    """What `close_loop(..., config=...)` changes. Shares are 0..1; nothing here has a unit but seconds."""
 
     # Is the residual noise?
     noise_excess: float = (
@@ -30,6 +30,9 @@ class AttributionConfig:
     least_independent: int = 50  # samples; with fewer the test cannot reject a first-order noise
 
     least_log_odds: float = 3.0  # of effects over a model that leaves noise without them, from which they are named: twenty times as likely, as a wrong record has to be
+
+    # Pages
+    first_page: float = 60.0  # s of a search before what it knows is shown: most are over by then
 
     # Fits
     least_explained_variance: float = (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -10,6 +11,8 @@ from contextlib import suppress
 
 from smajax.cli.terminal import INTERRUPTED, interrupts_answered
 
+BUDGET = "SMAJAX_BUDGET"  # s, of the process that is ended: it shows early what it knows
+SHARE = 0.1  # of them before the first page of a search
 GRACE = 2.0  # s between Ctrl-C and the end of a process that does not answer: a compilation cannot be interrupted
 
 
@@ -18,7 +21,7 @@ def run_within(seconds: float, words: Sequence[str]) -> int | None:
 
     Its output goes where ours does. Files are written whole or not at all, so none is half written when it is ended.
     """
-    process = subprocess.Popen([sys.executable, "-m", "smajax", *words])
+    process = subprocess.Popen([sys.executable, "-m", "smajax", *words], env={**os.environ, BUDGET: str(seconds)})
     try:
         return process.wait(timeout=seconds)
     except subprocess.TimeoutExpired:
@@ -36,6 +39,13 @@ def run_within(seconds: float, words: Sequence[str]) -> int | None:
                 process.send_signal(signal.SIGINT)
             code = process.wait()
         return INTERRUPTED if code < 0 else code  # ended before it could answer: its code is that of the signal
+
+
+def first_page(usual: float) -> float:
+    """Seconds of a search before its first page: `usual`, and fewer in a process that is ended before long. What that one starts is not ended."""
+    with suppress(ValueError):
+        return min(usual, SHARE * float(os.environ.pop(BUDGET, "inf")))
+    return usual
 
 
 def without(words: Sequence[str], option: str) -> list[str]:

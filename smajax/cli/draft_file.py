@@ -11,16 +11,18 @@ from smajax.core.files import replace
 from smajax.data.experiment.draft import Draft
 from smajax.data.experiment.errors import ExperimentError
 from smajax.data.open_experiment import open_experiment
-from smajax.report.preset_words import remarks
+from smajax.report.preset_words import remarks, starts_of
 
 
 @dataclass(frozen=True)
 class DraftFile:
-    """A draft as the other commands load it: warnings; why it cannot be loaded, or ""; what its runs depend on, None where that is not known."""
+    """A draft as the other commands load it: warnings; why it cannot be loaded, or ""; what its runs depend on, None where that is not known; whether its starts
+    are those of the ranking and not the preset's."""
 
     warnings: Sequence[str]
     reason: str
     ranking: PresetRanking | None
+    begun: bool = False
 
 
 def write_draft(result: Draft, out: Path) -> DraftFile:
@@ -31,6 +33,8 @@ def write_draft(result: Draft, out: Path) -> DraftFile:
     except ExperimentError as error:
         return DraftFile([], str(error), None)
     ranking = rank_presets(experiment)
+    starts = {}
     if ranking is not None:
-        replace(out, result.in_order(remarks(ranking)).text)
-    return DraftFile(experiment.warnings, "", ranking)
+        starts = starts_of(ranking) if result.presets else {}  # of a file or a model of the user's they are chosen
+        replace(out, result.begun_at(starts).in_order(remarks(ranking)).text)
+    return DraftFile(experiment.warnings, "", ranking, bool(starts))

@@ -13,6 +13,7 @@ from types import MappingProxyType
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from smajax.attribution.findings import EffectFinding, Findings, ResidualDiagnostics, RunFinding
 from smajax.core.display_units import axis_label, display, label
@@ -127,6 +128,7 @@ def errors_by_run(findings: Findings) -> bytes:
     axes.axvline(shown.of(findings.noise_sigma), color=MEASURED, linestyle="--", linewidth=1.0, label="noise")
     axes.set_xlabel(f"rms error ({shown.unit})" if shown.unit else "rms error", fontsize=9)
     axes.set_xlim(left=0.0)
+    axes.xaxis.set_major_locator(MaxNLocator(5))
     axes.set_ylim(-0.6, len(runs) - 0.4)
     figure.legend(loc="outside upper center", ncols=3, frameon=False, fontsize=9)
     tidy(axes)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from smajax.attribution.preset_ranking import MOVES, PresetInfluence, PresetRanking
 from smajax.core.display_units import digits, display
+from smajax.data.experiment.draft_parameters import amount
 
 WORTH = 0.1  # noises: below, a value hardly matters
 FIRST = 5  # in the message
@@ -30,11 +31,19 @@ def remarks(ranking: PresetRanking) -> dict[str, str]:
     return {one.name: _effect(one) for one in ranking.influences if one.noises >= WORTH}
 
 
-def sentence(ranking: PresetRanking) -> str:
-    """What matters most, and where the runs were simulated if that is not the start of the draft."""
+def starts_of(ranking: PresetRanking) -> dict[str, str]:
+    """Name -> start at which the wire transforms, as a draft has it, of unknowns at whose own start it hardly does; none where it does nowhere."""
+    if ranking.moves < MOVES:
+        return {}
+    return {name: amount(value, unit, 3) for name, (value, unit) in ranking.changed.items()}
+
+
+def sentence(ranking: PresetRanking, begun: bool = False) -> str:
+    """What matters most, and where the runs were simulated if that is not the start of the file. begun: whether the file begins where they were."""
     worth = [one for one in ranking.influences if one.noises >= WORTH]
+    which = "as the start in place of the preset's" if begun else "in place of the start"
     where = "".join(
-        f" (with {name} = {digits(shown.of(value), 3)} {shown.unit} in place of the start, at which the wire transforms too little)"
+        f" (with {name} = {digits(shown.of(value), 3)} {shown.unit} {which}, at which the wire transforms too little)"
         for name, (value, unit) in ranking.changed.items()
         for shown in [display(unit, name)]
     )

@@ -14,9 +14,10 @@ import pytest
 
 import smajax as sma
 from smajax.attribution import close_loop as stages
+from smajax.attribution.config import AttributionConfig
 from smajax.attribution.context import Interim
 from smajax.attribution.findings import CoefficientFinding, Findings, Remaining, Verdict
-from smajax.cli.budget import run_within, without
+from smajax.cli.budget import BUDGET, first_page, run_within, without
 from smajax.cli.commands.close_loop import run_close_loop
 from smajax.report.html import findings_to_html
 from smajax.report.narrative import narrate
@@ -52,6 +53,36 @@ def test_a_loop_that_resumes_leaves_a_page_that_knows_more_until_it_knows_as_muc
     assert (ended_after(rounds, "resumed") == before) == (rounds < 2)
 
 
+def test_what_is_ended_before_long_shows_early_what_it_knows(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(BUDGET, raising=False)
+    assert first_page(60.0) == 60.0
+    for value, page in (("120.0", 12.0), ("3600.0", 60.0), ("", 60.0), ("2min", 60.0)):
+        monkeypatch.setenv(BUDGET, value)
+        assert first_page(60.0) == pytest.approx(page)
+        assert first_page(60.0) == 60.0  # what this process starts is not ended
+
+
+def test_the_process_that_is_ended_knows_its_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    given: list[Any] = []
+
+    def started(words: list[str], env: dict[str, str]) -> Any:
+        given.append(env[BUDGET])
+        return SimpleNamespace(wait=lambda timeout: 0)
+
+    monkeypatch.setattr("smajax.cli.budget.subprocess.Popen", started)
+    assert run_within(90.0, []) == 0
+
+    def loop(*_: object, config: AttributionConfig, **__: object) -> None:
+        given.append(config.first_page)
+        raise EndedError
+
+    monkeypatch.setattr("smajax.attribution.close_loop.close_loop", loop)
+    monkeypatch.setenv(BUDGET, given[0])
+    with pytest.raises(EndedError):
+        run_close_loop(sma.load_experiment(bench(tmp_path)), tmp_path / "report", "", overwrite=False, show_hint=False)
+    assert given == ["90.0", pytest.approx(9.0)]
+
+
 @pytest.mark.parametrize("beside", [False, True])
 def test_a_long_search_gives_what_it_has_found_so_far(beside: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """After its first round already where it may, and then only when much more time has passed than that took, or takes beside the search."""
@@ -65,7 +96,8 @@ def test_a_long_search_gives_what_it_has_found_so_far(beside: bool, monkeypatch:
         now[0] += 0.0 if beside else 5.0
         return 5.0 if beside else 0.0
 
-    after_round = stages._now_and_then(cast(Any, None), shown)
+    context = SimpleNamespace(setting=SimpleNamespace(config=AttributionConfig()))
+    after_round = stages._now_and_then(cast(Any, context), shown)
     for later, effects in ((50.0, ("a",)), (20.0, ()), (5.0, ("a", "b")), (20.0, ("a", "c")), (30.0, ("a", "c"))):
         now[0] += later
         after_round(cast(Any, None), cast(Any, SimpleNamespace(effects=effects)))

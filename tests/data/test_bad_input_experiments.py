@@ -251,6 +251,14 @@ def test_a_constant_or_clipped_channel_is_a_warning(tmp_path: Path) -> None:
             table(tmp_path / name, t, *given)
         assert _warned(experiment, words), words
     assert _warned(experiment, "runs 'A' and 'B' have the same data")
+    table(tmp_path / "a.csv", t, u, x)
+    table(tmp_path / "b.csv", t, 0.0 * u, x)
+    assert _warned(
+        experiment, "run 'B': the input 'voltage' is 0 throughout, and the output moves: is it the right column?"
+    )
+    for other in (0.01 * x, 18.0 * np.exp(-t / 3.0)):  # a wire at rest, a hot one that cools
+        table(tmp_path / "b.csv", t, 0.0 * u, other)
+        assert not _warned(experiment, "is 0 throughout")
     # Another constant in each run is what was changed between them.
     for name, level in (("a.csv", 5.0), ("b.csv", 6.0)):
         table(tmp_path / name, t, 0.0 * t + level, x)

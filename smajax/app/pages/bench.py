@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import tomlkit
 
@@ -16,6 +17,9 @@ from smajax.app.step import FieldError, Sent, Step
 from smajax.core.units import UnitError, parse_quantity
 from smajax.data.experiment.errors import ExperimentError
 from smajax.data.readers.table import MeasuredDataError
+
+if TYPE_CHECKING:
+    from smajax.data.experiment.record import Experiment
 
 KINDS = ("wire", "load", "drive")
 
@@ -117,24 +121,34 @@ def influences(project: Project) -> Mapping[str, Any]:
     if found.experiment is None:
         return {"sentence": "", "remarks": {}}
     from smajax.attribution.preset_ranking import rank_presets
-    from smajax.report.preset_words import NO_NUMBER, remarks, sentence
+    from smajax.report.preset_words import NO_NUMBER, remarks, sentence, starts_of
 
     ranking = rank_presets(found.experiment)
     if ranking is None:
         return {"sentence": NO_NUMBER, "remarks": {}}
     said = remarks(ranking)
-    _beside_the_values(project, said, HEAD)
-    return {"sentence": sentence(ranking), "remarks": said}
+    begun = _beside_the_values(project, said, _of_the_preset(found.experiment, starts_of(ranking)), HEAD)
+    return {"sentence": sentence(ranking, begun=begun), "remarks": said}
 
 
-def _beside_the_values(project: Project, said: Mapping[str, str], head: str) -> None:
-    """Comments of the draft, as `new-experiment` writes them, where the file still has the draft's lines."""
+def _of_the_preset(experiment: Experiment, starts: Mapping[str, str]) -> dict[str, str]:
+    """Those of `starts` whose unknowns begin at the preset's value yet, and nowhere that the user chose."""
+    from smajax.core.parameters import parameter_values
+    from smajax.model.presets import build
+
+    usual = parameter_values(build(experiment.wire, experiment.load, experiment.drive))
+    begun = {one.name: one.start for one in experiment.unknowns}
+    return {name: start for name, start in starts.items() if math.isclose(begun[name], usual[name], rel_tol=0.01)}
+
+
+def _beside_the_values(project: Project, said: Mapping[str, str], starts: Mapping[str, str], head: str) -> bool:
+    """Comments and starts of the draft, as `new-experiment` writes them, where the file still has the draft's lines; whether it begins at the `starts` then."""
     file = project.file
     if file is None or head not in project.text:
-        return
+        return False
     from smajax.data.experiment.draft_facts import PAYLOAD, Known
     from smajax.data.experiment.draft_model import DraftModel
-    from smajax.data.experiment.draft_parameters import ordered, preset_parameters
+    from smajax.data.experiment.draft_parameters import begun_at, ordered, preset_parameters
 
     model = file.model
     inputs = tuple(name for name, one in file.channels.items() if one.role == "input")
@@ -145,7 +159,7 @@ def _beside_the_values(project: Project, said: Mapping[str, str], head: str) -> 
         {name: str(value) for name, value in model.parameters.items()}, likely, masses=masses, payloads=payloads
     )
     drafted = preset_parameters(DraftModel(model.wire, model.load, model.drive, inputs, "", ""), known)
-    text = ordered(project.text, drafted.presets, said)
+    text = ordered(begun_at(project.text, starts), drafted.presets, said)
     if text != project.text:
 
         def change(document: tomlkit.TOMLDocument) -> None:
@@ -154,6 +168,7 @@ def _beside_the_values(project: Project, said: Mapping[str, str], head: str) -> 
                 document.update(tomlkit.parse(text))
 
         edited(project.path, change)
+    return bool(starts)
 
 
 STEP = Step("bench", "Bench", page, save, keys=("model",), needs="experiment", to_look_at=True)

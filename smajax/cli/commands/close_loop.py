@@ -6,6 +6,7 @@ import json
 import shlex
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -44,7 +45,9 @@ def run_close_loop(
 ) -> tuple[Findings, Path]:
     """The findings and the path of their page, in the folder `out`. Raises FolderTaken."""
     from smajax.attribution.close_loop import close_loop
+    from smajax.attribution.config import AttributionConfig
     from smajax.attribution.findings import Remaining
+    from smajax.cli.budget import first_page
     from smajax.cli.progress_display import displayed
     from smajax.cli.result_folder import claimed
     from smajax.cli.written_beside import written_beside
@@ -68,7 +71,11 @@ def run_close_loop(
                 apart = known.remaining is Remaining.SEARCH
                 return begin_page(known, apart) if len(known.rounds) >= shown else 0.0
 
-            findings = close_loop(loaded, memory=out / "fits", progress=in_words, command=command, interim=interim)
+            config = AttributionConfig()
+            config = replace(config, first_page=first_page(config.first_page))
+            findings = close_loop(
+                loaded, memory=out / "fits", progress=in_words, command=command, config=config, interim=interim
+            )
         return findings, write_report(findings, out, loaded.path)
 
 

@@ -17,7 +17,7 @@ TIME = "time"
 # Quantity -> (words of headings, the program's own unit). In this order: "ambient temperature" is not "temperature".
 QUANTITIES: Mapping[str, tuple[frozenset[str], str]] = MappingProxyType(
     {
-        "ambient_temperature": (frozenset(["ambient", "room", "air", "environment", "tamb", "tinf"]), "degC"),
+        "ambient_temperature": (frozenset(["ambient", "amb", "room", "air", "environment", "tamb", "tinf"]), "degC"),
         "voltage": (
             frozenset(["voltage", "volt", "volts", "u", "v", "spannung", "vin", "ucmd", "vcmd", "tension"]),
             "V",
@@ -119,7 +119,17 @@ def _by_words(heading: str, unit: str) -> str:
 def _unit(table: Table, name: str) -> str:
     """The column's unit as the unit library has it; empty where neither file nor heading says."""
     said = unit_of(table, name)
-    return MEANT.get(said, said)
+    return "degF" if not said and _in_fahrenheit(table, name) else MEANT.get(said, said)
+
+
+def _in_fahrenheit(table: Table, name: str) -> bool:
+    """Whether a temperature ends with `_F`, and no other column has another letter there, as thermocouples do."""
+    stem, _, letter = name.rpartition("_")
+    if letter not in ("F", "f") or _by_words(stem, "") not in ("temperature", "ambient_temperature") or stem == "t":
+        return False
+    return not any(
+        other.rpartition("_")[0] == stem and len(other) == len(name) for other in table.columns if other != name
+    )
 
 
 def _column(table: Table, key: str | int, name: str) -> Column:
@@ -212,7 +222,9 @@ def columns_of(table: Table) -> list[Column]:
     order = [name for name in every if name in table.columns]
     headed = not all(name.isdigit() for name in every)
     clocks = [name for name in order if _is_clock(table, name, headed)]
-    clock = None if table.clocks else next((name for name in clocks if name in table.moments), next(iter(clocks), None))
+    # Before one that may be a temperature, `T_1`, one that has a moment or a unit of time.
+    clocks.sort(key=lambda name: (name not in table.moments, not _unit(table, name)))
+    clock = None if table.clocks else next(iter(clocks), None)
     result: list[Column] = []
     if clock is not None:
         unit = _unit(table, clock)

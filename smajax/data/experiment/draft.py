@@ -21,10 +21,10 @@ from smajax.data.experiment.column_guess import (
     time_unit_of,
     times_not_read,
 )
-from smajax.data.experiment.draft_channels import channel_lines, override_lines
+from smajax.data.experiment.draft_channels import NOT_NEEDED, channel_lines, override_lines
 from smajax.data.experiment.draft_facts import PAYLOAD, BenchFacts, Known, diameter_of, facts_of
 from smajax.data.experiment.draft_model import DraftModel, ModelChoice, choose_model, wire_messages
-from smajax.data.experiment.draft_parameters import PresetLine, kept_parameters, ordered, preset_parameters
+from smajax.data.experiment.draft_parameters import PresetLine, begun_at, kept_parameters, ordered, preset_parameters
 from smajax.data.experiment.first_force import first_force
 from smajax.data.experiment.grouping import RunFiles
 from smajax.data.experiment.logs import Logs, Requested, logs_of
@@ -49,6 +49,10 @@ class Draft:
     messages: tuple[str, ...]
     presets: tuple[PresetLine, ...] = ()
     of_bench: tuple[str, ...] = ()
+
+    def begun_at(self, starts: Mapping[str, str]) -> Draft:
+        """With other starts of unknowns, by name, each with its unit."""
+        return replace(self, text=begun_at(self.text, starts))
 
     def in_order(self, remarks: Mapping[str, str]) -> Draft:
         """With the values that are the preset's in the order of `remarks`, by name, each with its own beside it."""
@@ -327,21 +331,19 @@ def _channels(inputs: _Inputs) -> _Section:
                 "",
             ]
             messages.append(f"{name}: MISSING, an {role} that the model needs")
-    sensors = {"temperature", "stress", "force", "strain", "resistance"}
+    sensors = {"temperature", "stress", "force", "strain", "resistance", "position", "angle"}
     for one, _ in inputs.logs.columns:
         if one.quantity and one.quantity not in {TIME, *roles}:
             role = "output" if one.quantity in sensors else "input"
+            said = NOT_NEEDED.get(one.quantity, NOT_NEEDED[role])
             lines += [
-                f"# {'A further output, where it is of this wire' if role == 'output' else 'Not used by this model'}: {one.name}",
+                f"# {said.comment}: {one.name}",
                 *channel_lines(
                     one.quantity, role, one, inputs.is_variable(one.quantity), True, inputs.has_gaps(one.quantity)
                 ),
                 "",
             ]
-            if role == "output":
-                messages.append(
-                    f"{one.name}: a further output, a comment in the draft: remove the # where it is of this wire"
-                )
+            messages.append(f"{one.name}: {said.message}")
     return _Section(lines, messages)
 
 

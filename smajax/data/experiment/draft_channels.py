@@ -3,11 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
+from typing import NamedTuple
 
 from smajax.data.experiment.column_guess import GUESS, LIKELY, SURE, Column
 from smajax.data.experiment.schema import noise_example
 from smajax.data.experiment.toml_file import toml_value
 
+
+class Said(NamedTuple):
+    """What a draft says of a column."""
+
+    comment: str  # above its section, before its name
+    message: str  # on the terminal, behind its name
+
+
+# Of columns that the model need not have, by quantity or role.
+NOT_NEEDED: Mapping[str, Said] = MappingProxyType(
+    {
+        "output": Said(
+            "A further output, where it is of this wire",
+            "a further output, a comment in the draft: remove the # where it is of this wire",
+        ),
+        "input": Said("Not used by this model", "an input that this model does not take, a comment in the draft"),
+        "ambient_temperature": Said(
+            "The temperature of the air, where it changes",
+            "the temperature of the air, a comment in the draft: remove the # where it changes from run to run or within a run",
+        ),
+    }
+)
 ABSOLUTE = ("temperature", "resistance")  # whose zero nobody sets from run to run, as that of a position
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -51,6 +52,14 @@ def ordered(text: str, presets: Sequence[PresetLine], remarks: Mapping[str, str]
     rest = [one.text() for one in presets if one.listed and one.name not in remarks]
     before = [one.text() for one in presets if one.listed]
     return text.replace("\n".join([HEAD, *before]), "\n".join([HEAD, *first, *rest]), 1)
+
+
+def begun_at(text: str, starts: Mapping[str, str]) -> str:
+    """The file with other starts of unknowns, by name, each with its unit."""
+    for name, start in starts.items():
+        line = rf'(?m)^({re.escape(name)} = \{{.*\bstart = )"[^"]*"'
+        text = re.sub(line, rf'\g<1>"{start}"', text)
+    return text
 
 
 def amount(value: float, unit: str, places: int, like: float | None = None) -> str:

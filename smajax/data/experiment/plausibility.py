@@ -12,6 +12,7 @@ from smajax.data.experiment.schema import RunSection, TimeSection, is_counted
 from smajax.data.experiment.signals import ReadRun, Signal, time_unit
 from smajax.data.readers.table import Array
 
+HEATING = ("voltage", "current", "power", "duty")  # inputs without which a wire stays cold
 FEW_SAMPLES = 20
 GAP_STEPS = 5.0
 FLAT_SAMPLES = 5
@@ -156,7 +157,41 @@ def constant_warnings(runs: Sequence[ReadRun]) -> list[str]:
         if name not in runs[0].run.outputs
         and np.ptp(np.concatenate([read.signals[name].values for read in runs if name in read.signals])) == 0.0
     ]
-    return [f"the input {name!r} never changes in any run; is it the right column?" for name in still]
+    result = [f"the input {name!r} never changes in any run; is it the right column?" for name in still]
+    return result + [line for name in HEATING for line in _zero_in_a_run(runs, name) if name not in still]
+
+
+def _zero_in_a_run(runs: Sequence[ReadRun], name: str) -> list[str]:
+    """Runs without any heating in which an output goes half as far as in another run and back. One way alone it goes in a wire that cools."""
+    result = []
+    for read in runs:
+        cold = name in read.signals and not read.signals[name].values.any()
+        others = [one for one in read.signals if one != name and one not in read.run.outputs]
+        if not cold or any(np.ptp(read.signals[one].values) > 0.0 for one in others):
+            continue
+        if any(_returns(read.signals[one].measured) > 0.5 * _largest(runs, one, read) for one in read.run.outputs):
+            result.append(
+                f"run {read.run.name!r}: the input {name!r} is 0 throughout, and the output moves: is it the right column?"
+            )
+    return result
+
+
+def _returns(values: Array) -> float:
+    """The lesser of the largest rise and the largest fall."""
+    if not values.size:
+        return 0.0
+    rise = np.max(values - np.minimum.accumulate(values))
+    return float(min(rise, np.max(np.maximum.accumulate(values) - values)))
+
+
+def _largest(runs: Sequence[ReadRun], output: str, but: ReadRun) -> float:
+    """Range of an output in the other run in which it is largest; infinite where no other run has it."""
+    ranges = [
+        float(np.ptp(read.signals[output].measured))
+        for read in runs
+        if read is not but and output in read.signals and read.signals[output].measured.size
+    ]
+    return max(ranges, default=np.inf)
 
 
 def quantum_warning(runs: Sequence[ReadRun], name: str, sensor_noise: float) -> list[str]:

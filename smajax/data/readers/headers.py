@@ -69,6 +69,7 @@ TAILS = {
     "mm",
     "um",
     "degC",
+    "degF",
     "deg",
     "rad",
     "N",

@@ -30,7 +30,8 @@ class InputDelay(AbstractEffect, InputLagTerm):
         equation="input",
         formula="u(t) = u_recorded(t - tau)",
         sentence="The input and the sensor were not logged on the same clock: what the log shows acted a little later.",
-        negative_sentence="The input and the sensor were not logged on the same clock: what the log shows acted a little earlier.",
+        negative_sentence="The input and the sensor were not logged on the same clock: what the log shows acted a little earlier. "
+        "A command that the logger only reads, and does not set, is late by half a sampling interval already.",
         switches=("delay",),
         initial_guess={"delay": 0.03},
         needs_time=True,

@@ -58,7 +58,8 @@ def look_at(outlier: OutlierRun) -> str:
 def of_the_noise(findings: Findings) -> Iterator[str]:
     """A residual that is hardly larger than the noise, or whose noise has a slow part."""
     after, config = findings.residual_after, findings.config
-    if findings.verdict not in NOTHING_MORE and not after.white and after.ratio < config.noise_may_be_wrong:
+    little = not after.white and after.ratio < config.noise_may_be_wrong
+    if findings.verdict not in NOTHING_MORE and little and not held_out_off(findings):
         yield (
             f"What is left is no more than {after.ratio:.2f} times the noise: noise that is larger than {_declared(findings)}, or autocorrelated, looks the "
             "same. Look at a stretch of the log in which nothing moves before you look for physics."
@@ -321,7 +322,7 @@ def held_out_warnings(findings: Findings) -> list[str]:
         f"{run.name}, which was held out, is off by {value_text(error, unit, name)}"
         + (f" ({label(name)})" if name != findings.output_name else "")
         + f", {error / fitted:.1f} times the fit runs' error: the model misses what shows "
-        "there and not in them, or something was different then (another day, another state of the wire)."
+        "there and not in them, or something was different then (the air had another temperature, another day, another state of the wire)."
         for run, name, unit, error, fitted in _outputs_off(findings)
     ]
 

@@ -183,7 +183,7 @@ def _adequate(findings: Findings) -> str:
     several = len(off) > 1
     return (
         f"The fit runs lack nothing: {noise}. But of the held-out runs {and_listed([run.name for run in off])} {'are' if several else 'is'} predicted worse: something was "
-        "different then (another day, another state of the wire), or what shows there does not show in the fit runs, or these do not determine a parameter that "
+        "different then (the air had another temperature, another day, another state of the wire), or what shows there does not show in the fit runs, or these do not determine a parameter that "
         f"matters there. If nothing was different, make {'one of them' if several else 'it'} a fit run and hold another one out."
     )
 
@@ -261,6 +261,7 @@ def _partly(findings: Findings) -> str:
 def _explained(findings: Findings) -> str:
     """As sure as the runs allow: one fit run and none held out confirm nothing, and a held-out run that is off says the contrary."""
     listed = and_listed([effect.title for effect in findings.added])
+    with_it = "With them" if len(findings.added) > 1 else "With it"
     if _several(findings):
         off = caveats.held_out_off(findings)
         but = f", but not on {and_listed([run.name for run in off])}, held out: more may be missing" if off else ""
@@ -268,9 +269,9 @@ def _explained(findings: Findings) -> str:
         left_out = doubt(findings) == NOT_LEFT_OUT
         lacks = "may lack" if doubtful or left_out else "lacks"
         share = f" Fits without each run explain {max(findings.explained_variance, 0.0):.0%} of the motion in it: one run alone may show what is missing, or inputs and outputs do not belong together. Hold a run out."
-        return f"The base model {lacks}: {listed}. With it, what is left on the fit runs is measurement noise{but}.{share if left_out else ''}"
+        return f"The base model {lacks}: {listed}. {with_it}, what is left on the fit runs is measurement noise{but}.{share if left_out else ''}"
     return (
-        f"The base model may lack: {listed}. With it, what is left on the one fit run is measurement noise. No run was "
+        f"The base model may lack: {listed}. {with_it}, what is left on the one fit run is measurement noise. No run was "
         "left out or held out, so nothing confirms it."
     )
 
