@@ -33,8 +33,8 @@ def write_draft(result: Draft, out: Path) -> DraftFile:
     except ExperimentError as error:
         return DraftFile([], str(error), None)
     ranking = rank_presets(experiment)
-    starts = {}
-    if ranking is not None:
-        starts = starts_of(ranking) if result.presets else {}  # of a file or a model of the user's they are chosen
-        replace(out, result.begun_at(starts).in_order(remarks(ranking)).text)
+    if ranking is None:
+        return DraftFile(experiment.warnings, "", None)
+    starts = starts_of(ranking) if result.presets else {}  # of a file or a model of the user's they are chosen
+    replace(out, result.begun_at(starts).in_order(remarks(ranking)).text)
     return DraftFile(experiment.warnings, "", ranking, bool(starts))

@@ -127,7 +127,7 @@ def influences(project: Project) -> Mapping[str, Any]:
     if ranking is None:
         return {"sentence": NO_NUMBER, "remarks": {}}
     said = remarks(ranking)
-    begun = _beside_the_values(project, said, _of_the_preset(found.experiment, starts_of(ranking)), HEAD)
+    begun = HEAD in project.text and _as_drafted(project, said, _of_the_preset(found.experiment, starts_of(ranking)))
     return {"sentence": sentence(ranking, begun=begun), "remarks": said}
 
 
@@ -141,10 +141,10 @@ def _of_the_preset(experiment: Experiment, starts: Mapping[str, str]) -> dict[st
     return {name: start for name, start in starts.items() if math.isclose(begun[name], usual[name], rel_tol=0.01)}
 
 
-def _beside_the_values(project: Project, said: Mapping[str, str], starts: Mapping[str, str], head: str) -> bool:
-    """Comments and starts of the draft, as `new-experiment` writes them, where the file still has the draft's lines; whether it begins at the `starts` then."""
+def _as_drafted(project: Project, said: Mapping[str, str], starts: Mapping[str, str]) -> bool:
+    """Comments and starts of the draft, as `new-experiment` writes them, in a file that has its lines still; whether it begins at the `starts` then."""
     file = project.file
-    if file is None or head not in project.text:
+    if file is None:
         return False
     from smajax.data.experiment.draft_facts import PAYLOAD, Known
     from smajax.data.experiment.draft_model import DraftModel

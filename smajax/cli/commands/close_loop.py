@@ -6,7 +6,6 @@ import json
 import shlex
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -71,8 +70,7 @@ def run_close_loop(
                 apart = known.remaining is Remaining.SEARCH
                 return begin_page(known, apart) if len(known.rounds) >= shown else 0.0
 
-            config = AttributionConfig()
-            config = replace(config, first_page=first_page(config.first_page))
+            config = AttributionConfig(first_page=first_page(AttributionConfig.first_page))
             findings = close_loop(
                 loaded, memory=out / "fits", progress=in_words, command=command, config=config, interim=interim
             )

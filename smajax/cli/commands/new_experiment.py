@@ -169,13 +169,8 @@ def _print(messages: Sequence[str], loaded: DraftFile, out: Path, ranked: bool) 
     if loaded.reason:
         typer.echo(f"It cannot be loaded yet: {loaded.reason}")
     if ranked:
-        typer.echo(
-            NOT_LOADED
-            if loaded.reason
-            else NO_NUMBER
-            if loaded.ranking is None
-            else sentence(loaded.ranking, begun=loaded.begun)
-        )
+        known = NO_NUMBER if loaded.ranking is None else sentence(loaded.ranking, begun=loaded.begun)
+        typer.echo(NOT_LOADED if loaded.reason else known)
     typer.echo(f"Written: {out.resolve()}")
     if not loaded.reason:
         typer.echo(

@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from smajax.core.wording import and_listed, counted
+from smajax.data.experiment.column_guess import DRIVES
 from smajax.data.experiment.record import Run
 from smajax.data.experiment.schema import RunSection, TimeSection, is_counted
 from smajax.data.experiment.signals import ReadRun, Signal, time_unit
 from smajax.data.readers.table import Array
 
-HEATING = ("voltage", "current", "power", "duty")  # inputs without which a wire stays cold
 FEW_SAMPLES = 20
 GAP_STEPS = 5.0
 FLAT_SAMPLES = 5
@@ -158,7 +158,7 @@ def constant_warnings(runs: Sequence[ReadRun]) -> list[str]:
         and np.ptp(np.concatenate([read.signals[name].values for read in runs if name in read.signals])) == 0.0
     ]
     result = [f"the input {name!r} never changes in any run; is it the right column?" for name in still]
-    return result + [line for name in HEATING for line in _zero_in_a_run(runs, name) if name not in still]
+    return result + [line for name in DRIVES for line in _zero_in_a_run(runs, name) if name not in still]
 
 
 def _zero_in_a_run(runs: Sequence[ReadRun], name: str) -> list[str]:

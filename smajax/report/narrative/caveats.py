@@ -30,6 +30,7 @@ NAMED_SIZES = 4  # in a sentence
 UNLIKE = 2.0  # by which the noises that outputs leave differ and are more than noise
 NORMAL_95 = 1.96
 UNUSUAL = 5.0  # widths of its prior that an effect is off
+DIFFERENT = "something was different then (the air had another temperature, another day, another state of the wire)"
 LEAST_SEPARATION = 1.0  # noises by which a run has to separate two models to be worth doing
 
 
@@ -322,7 +323,7 @@ def held_out_warnings(findings: Findings) -> list[str]:
         f"{run.name}, which was held out, is off by {value_text(error, unit, name)}"
         + (f" ({label(name)})" if name != findings.output_name else "")
         + f", {error / fitted:.1f} times the fit runs' error: the model misses what shows "
-        "there and not in them, or something was different then (the air had another temperature, another day, another state of the wire)."
+        f"there and not in them, or {DIFFERENT}."
         for run, name, unit, error, fitted in _outputs_off(findings)
     ]
 

@@ -182,8 +182,8 @@ def _adequate(findings: Findings) -> str:
         return f"Nothing is missing whose trace is larger than the noise: {noise}."
     several = len(off) > 1
     return (
-        f"The fit runs lack nothing: {noise}. But of the held-out runs {and_listed([run.name for run in off])} {'are' if several else 'is'} predicted worse: something was "
-        "different then (the air had another temperature, another day, another state of the wire), or what shows there does not show in the fit runs, or these do not determine a parameter that "
+        f"The fit runs lack nothing: {noise}. But of the held-out runs {and_listed([run.name for run in off])} {'are' if several else 'is'} predicted worse: "
+        f"{caveats.DIFFERENT}, or what shows there does not show in the fit runs, or these do not determine a parameter that "
         f"matters there. If nothing was different, make {'one of them' if several else 'it'} a fit run and hold another one out."
     )
 
