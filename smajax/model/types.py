@@ -24,8 +24,8 @@ class WireState(eqx.Module):
     martensite_fraction: Scalar  # -, 1 = all martensite
     xi_M: Scalar  # amplitude of the martensite-to-austenite curve, eq. 3.3
     xi_A: Scalar  # floor of the austenite-to-martensite curve, eq. 3.5
-    heating_missed: Scalar  # 1 from where the conditions kept the wire from its heating curve until it follows it
-    cooling_missed: Scalar  # the same of its cooling curve; both else 0
+    heating_missed: Scalar  # xi_M that counts again if the wire comes back, where the conditions keep it from its curve; -1: not known; else 0
+    cooling_missed: Scalar  # 1 - xi_A, likewise. Meanwhile xi_M and xi_A are of curves through the present state
     detwinned_fraction: Scalar  # xi_s: the part of the martensite that gives strain, all of it without Brinson's split
     formed_by_loading: Scalar  # 1 where loading, not cooling, formed the martensite last; else 0
     history: dict[str, Scalar] = eqx.field(default_factory=dict)  # of effects (`wire/history.py`); mostly empty

@@ -15,8 +15,9 @@ from hypothesis import strategies as st
 
 from smajax.core.parameters import get_parameters, set_parameters, set_vector
 from smajax.model.presets import build
-from smajax.model.system import System
-from smajax.model.wire.branch_amplitude import AsPrinted, Corrected
+from smajax.model.system import System, initial_state
+from smajax.model.types import WireState
+from smajax.model.wire.branch_amplitude import UNKNOWN, Amplitudes, AsPrinted, Corrected
 from smajax.model.wire.conditions import BrinsonAsPrinted
 from smajax.model.wire.form import IntegratedForm, RateForm
 from smajax.model.wire.kinetics import austenite_left, martensite_left
@@ -31,6 +32,7 @@ from tests.helpers.often import often
 RUN = simulate_compiled
 EACH = 60  # samples a leg
 NAMES = sorted(LAWS)
+AMPLITUDES = [field.name for field in dataclasses.fields(Amplitudes)]
 RENEWALS = {"corrected": Corrected, "printed": AsPrinted}
 
 
@@ -138,6 +140,62 @@ def test_a_repeated_minor_loop_closes(law: str) -> None:
     assert abs(hot[-1] - hot[-2]) < 1e-3
     assert abs(cold[-1] - cold[-2]) < 1e-3
     assert cold[-1] > hot[-1] + 0.05
+
+
+@pytest.mark.parametrize("more", [6.9e6, 8e6, 20e6, 200e6])
+@pytest.mark.parametrize("cold", [False, True])
+def test_a_curve_that_the_conditions_kept_the_wire_from_stays_where_the_stress_returns(more: float, cold: bool) -> None:
+    """By Liang's conditions: the stress goes past the point where the wire turned back, against the temperature, and returns."""
+    system = _with(COUPON, "liang")
+    wire, level = system.wire.kinetics, 250e6
+    shift, sign = level / 6.89e6, 1.0 if cold else -1.0
+    turn = (47.0 if cold else 73.0) + shift
+    temperature = [20.0, 140.0] if cold else [20.0]
+    begun = len(temperature)
+    temperature += [turn, turn + sign, turn + 2.0 * sign, turn + 7.0 * sign, turn + 0.1 * sign, turn - 2.0 * sign]
+    stress = [level] * len(temperature)
+    stress[begun + 1] += sign * more
+    xi = np.asarray(_driven(system, temperature, stress).martensite_fraction)[::EACH][begun:]
+    left = austenite_left if cold else martensite_left
+    there, after = (
+        float(left(wire, NO_TERMS, jnp.asarray(one), jnp.asarray(level))) for one in (turn, temperature[-1])
+    )
+    np.testing.assert_allclose(xi[:5], 1.0 - there if cold else there, atol=1e-9)
+    np.testing.assert_allclose(xi[5], 1.0 - after if cold else after, atol=1e-9)
+
+
+def _of_wire(state: WireState, **numbers: float) -> WireState:
+    return dataclasses.replace(state, **{name: jnp.asarray(value) for name, value in numbers.items()})
+
+
+@pytest.mark.parametrize("heating", [True, False])
+@pytest.mark.parametrize("off", [0.0, 1e-6])
+def test_a_corrected_wire_that_was_kept_from_a_curve_goes_on_from_where_it_is(heating: bool, off: float) -> None:
+    """A filter's fraction tells no curve: until the wire follows one, that one is laid through the present state."""
+    state = initial_state(COUPON, {"temperature": jnp.asarray(20.0), "stress": jnp.asarray(100e6)}).wire
+    share, still = jnp.asarray(0.4), jnp.asarray(False)
+    # The wire is at 0.5, on the curve through it, and was kept from one that begins at a fraction of 1 (ends at one of 0).
+    amplitudes = {"xi_M": 1.25, "heating_missed": 1.0} if heating else {"xi_A": -0.25, "cooling_missed": 1.0}
+    kept = _of_wire(state, martensite_fraction=0.5, **amplitudes)
+    xi = 0.5 + off if heating else 0.5 - off
+
+    def missed(amplitudes: Amplitudes) -> float:
+        return float(amplitudes.heating_missed if heating else amplitudes.cooling_missed)
+
+    def on_curve(amplitudes: Amplitudes, share: jax.Array) -> float:
+        return float(amplitudes.xi_M * share if heating else 1.0 - (1.0 - amplitudes.xi_A) * share)
+
+    after = Corrected().corrected(kept, still, share, share, jnp.asarray(xi))
+    assert missed(after) == (0.0 if off else UNKNOWN)
+    assert on_curve(after, share) == pytest.approx(xi, rel=1e-12)
+    wire = _of_wire(kept, martensite_fraction=xi, **{name: float(getattr(after, name)) for name in AMPLITUDES})
+    if not off:
+        for other in (0.6, 0.9, 0.3):
+            then = Corrected().renewed(wire, still, still, jnp.asarray(other), jnp.asarray(other), jnp.asarray(xi))
+            assert missed(then) == UNKNOWN
+            assert on_curve(then, jnp.asarray(other)) == pytest.approx(xi, rel=1e-12)
+    followed = Corrected().renewed(wire, jnp.asarray(heating), jnp.asarray(not heating), share, share, jnp.asarray(xi))
+    assert missed(followed) == 0.0
 
 
 @settings(max_examples=20, deadline=None)

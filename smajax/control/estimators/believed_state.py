@@ -57,7 +57,7 @@ def within_one(state: State) -> State:
     An amplitude beyond 1 is no branch of any wire: it is a temperature believed too high while the wire rests on its curve.
     """
     wire = state.wire
-    beyond_one = (wire.xi_M > 1.0) & (wire.heating_missed < 0.5)
+    beyond_one = (wire.xi_M > 1.0) & (wire.heating_missed == 0.0)
     return dataclasses.replace(
         state, wire=dataclasses.replace(wire, xi_M=jnp.where(beyond_one, jnp.ones_like(wire.xi_M), wire.xi_M))
     )

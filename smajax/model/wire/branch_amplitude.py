@@ -27,13 +27,17 @@ def beyond(gap: Scalar) -> Bool[Array, ""]:
     return gap > max(REST, ROUNDINGS * float(jnp.finfo(gap.dtype).eps))
 
 
+# Of an amplitude that nobody knows: a wire that starts beyond the end of a range.
+UNKNOWN = -1.0
+
+
 class Amplitudes(eqx.Module):
     """What a renewal carries from step to step."""
 
     xi_M: Scalar
     xi_A: Scalar
-    heating_missed: Scalar  # 1 from where the wire was kept from a curve until it follows one again; else 0
-    cooling_missed: Scalar
+    heating_missed: Scalar  # xi_M of the curve that the wire is kept from, while it lies beyond, or `UNKNOWN`; else 0
+    cooling_missed: Scalar  # 1 - xi_A, likewise
 
 
 class AbstractRenewal(eqx.Module):
@@ -69,9 +73,11 @@ class Corrected(AbstractRenewal):
 
     Continuous at a reversal, complete at the end of the range, and blind to a pause. Where the conditions keep the wire
     from following a curve (Liang's, when the stress falls faster than the temperature), or it starts beyond one, the
-    curve is laid through the present state from then on. So the fraction does not jump when it may follow again, and
-    what was missed is made up for in what is left of the range: all of it, in a fraction of a degree, if hardly any is
-    left. (The source's rates would lose it instead and never complete.)
+    curve is laid through the present state. So the fraction does not jump when it may follow again, and what was missed
+    is made up for in what is left of the range: all of it, in a fraction of a degree, if hardly any is left. (The
+    source's rates would lose it instead and never complete.) If the wire comes back before it may follow, the curve is
+    the one of before: a vibration that takes the stress past the point where the wire turned back, and returns it,
+    changes nothing, however far it went. (Where it may follow in between, for however short, it begins anew from there.)
     """
 
     def start(self, h: Scalar, k: Scalar, xi: Scalar) -> Amplitudes:
@@ -79,8 +85,8 @@ class Corrected(AbstractRenewal):
         return Amplitudes(
             xi / jnp.maximum(h, FINISHED),
             jnp.where(xi >= 1.0, 0.0, floor),
-            1.0 * ((h <= FINISHED) & (xi > 0.0)),
-            1.0 * ((k <= FINISHED) & (xi < 1.0)),
+            jnp.where((h <= FINISHED) & (xi > 0.0), UNKNOWN, 0.0),
+            jnp.where((k <= FINISHED) & (xi < 1.0), UNKNOWN, 0.0),
         )
 
     def curves(self, old: WireState, h_old: Scalar, k_old: Scalar, h: Scalar, k: Scalar) -> tuple[Scalar, Scalar]:
@@ -95,17 +101,18 @@ class Corrected(AbstractRenewal):
         k: Scalar,
         xi: Scalar,
     ) -> Amplitudes:
-        beyond_heating = ~heating & beyond(xi - old.xi_M * h)
-        beyond_cooling = ~cooling & beyond(1.0 - (1.0 - old.xi_A) * k - xi)
+        top, floor = self._kept_from(old)
         held = ~heating & ~cooling
-        missed_heating = held & (beyond_heating | (old.heating_missed > 0.5))
-        missed_cooling = held & (beyond_cooling | (old.cooling_missed > 0.5))
+        beyond_heating = ~heating & beyond(xi - top * h)
+        beyond_cooling = ~cooling & beyond(1.0 - (1.0 - floor) * k - xi)
+        lost_heating, lost_cooling = held & (old.heating_missed < 0.0), held & (old.cooling_missed < 0.0)
         laid_heating, laid_cooling = xi / jnp.maximum(h, FINISHED), 1.0 - (1.0 - xi) / jnp.maximum(k, FINISHED)
+        kept_heating, kept_cooling = jnp.where(heating, old.xi_M, top), jnp.where(cooling, old.xi_A, floor)
         return Amplitudes(
-            jnp.where(cooling | beyond_heating | missed_heating, laid_heating, old.xi_M),
-            jnp.where(heating | beyond_cooling | missed_cooling, laid_cooling, old.xi_A),
-            1.0 * missed_heating,
-            1.0 * missed_cooling,
+            jnp.where(cooling | beyond_heating | lost_heating, laid_heating, kept_heating),
+            jnp.where(heating | beyond_cooling | lost_cooling, laid_cooling, kept_cooling),
+            jnp.where(lost_heating, UNKNOWN, jnp.where(held & beyond_heating, top, 0.0)),
+            jnp.where(lost_cooling, UNKNOWN, jnp.where(held & beyond_cooling, 1.0 - floor, 0.0)),
         )
 
     def corrected(self, old: WireState, transforming: Bool[Array, ""], h: Scalar, k: Scalar, xi: Scalar) -> Amplitudes:
@@ -113,11 +120,22 @@ class Corrected(AbstractRenewal):
         # Off both branches a curve ahead of the wire is its memory of where it turned back: that one stays.
         heating = transforming | beyond(xi - old.xi_M * h)
         cooling = transforming | beyond(1.0 - (1.0 - old.xi_A) * k - xi)
+        # Of a fraction that is put elsewhere, the curve that the wire was kept from is not known.
+        lost_heating = jnp.where(old.heating_missed != 0.0, UNKNOWN, 0.0)
+        lost_cooling = jnp.where(old.cooling_missed != 0.0, UNKNOWN, 0.0)
         return Amplitudes(
             jnp.where(heating, laid.xi_M, old.xi_M),
             jnp.where(cooling, laid.xi_A, old.xi_A),
-            jnp.where(heating, laid.heating_missed, old.heating_missed),
-            jnp.where(cooling, laid.cooling_missed, old.cooling_missed),
+            jnp.where(heating, laid.heating_missed, lost_heating),
+            jnp.where(cooling, laid.cooling_missed, lost_cooling),
+        )
+
+    @staticmethod
+    def _kept_from(old: WireState) -> tuple[Scalar, Scalar]:
+        """xi_M and xi_A of the curves that the wire would follow if the conditions had let it."""
+        return (
+            jnp.where(old.heating_missed > 0.0, old.heating_missed, old.xi_M),
+            jnp.where(old.cooling_missed > 0.0, 1.0 - old.cooling_missed, old.xi_A),
         )
 
 
