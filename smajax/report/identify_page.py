@@ -10,7 +10,6 @@ import numpy as np
 
 from smajax.core.display_units import correlation, digits, display, label
 from smajax.core.files import json_text, replace
-from smajax.core.names_of_runs import parameter_of
 from smajax.fit.directions import weak
 from smajax.fit.identify_result import Identified, IdentifiedOutput
 from smajax.report import identify_pictures as draw
@@ -174,16 +173,6 @@ def page(result: Identified, steps: Sequence[Step] = ()) -> str:
             *(series(plot, dpi=COARSE) for plot in draw.suggested_inputs(result)),
         ]
     parts += ["<h2>Runs</h2>", table(run_head, runs, range(2, len(run_head)))]
-    if result.values_of_held_out_runs:
-        units = {parameter_of(one.name): display(one.unit, one.name) for one in result.estimates}
-        own = [
-            f"{name} {digits(units[parameter_of(name)].of(value))} {units[parameter_of(name)].unit}".strip()
-            for name, value in result.values_of_held_out_runs.items()
-        ]
-        parts.append(
-            f"<p class=quiet>What is each run's own was found for the held-out runs from themselves, all else held: "
-            f"{say('; '.join(own))}.</p>"
-        )
     parts += _run_parts(result)
     parts += [
         "<h2>Checks and provenance</h2>",

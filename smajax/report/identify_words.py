@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from smajax.core.display_units import digits, display, label, p_value, with_error
+from smajax.core.names_of_runs import parameter_of
 from smajax.core.whiteness import WHITE
 from smajax.core.wording import and_listed, counted, times_noise
 from smajax.data.experiment.record import Prior
@@ -87,6 +88,18 @@ def _with_unit(one: Estimate) -> str:
     return f"{with_error(unit.of(one.value), error)} {unit.unit}".strip()
 
 
+def _of_held_out(result: Identified) -> list[str]:
+    """The values of its own that each held-out run has."""
+    units = {parameter_of(one.name): display(one.unit, one.name) for one in result.estimates}
+    own = [
+        f"{name} {digits((unit := units[parameter_of(name)]).of(value))} {unit.unit}".strip()
+        for name, value in result.values_of_held_out_runs.items()
+    ]
+    if not own:
+        return []
+    return [f"What is each run's own was found for the held-out runs from themselves, all else held: {'; '.join(own)}."]
+
+
 def conclusions(result: Identified) -> list[str]:
     """What was found, in sentences that say no more than the numbers."""
     sentences = [
@@ -94,6 +107,7 @@ def conclusions(result: Identified) -> list[str]:
         *_determined(result),
         ended_sentence(result.ended),
         *(_error(result, k) for k in range(len(result.outputs))),
+        *_of_held_out(result),
         *_worse_held_out(result),
     ]
     larger = [one for one in result.outputs if one.noise_before and one.noise_sigma > OFF * one.noise_before]

@@ -275,7 +275,7 @@ def magnitude_warnings(
     runs: Sequence[ReadRun], scale: Scale | None, heats: Sequence[str], step: float, offset: Collection[str] = ()
 ) -> list[str]:
     """All of them. scale: of the model at its known values and starts; heats: the inputs that heat the wire; offset: outputs with a zero of their own in each run."""
-    result = [*_size_warnings(runs), *_exchange_warnings(runs, heats)]
+    result = [*_exchange_warnings(runs, heats), *_size_warnings(runs)]
     if scale is not None:
         result += _mass_warnings(scale.masses)
         result += [*_heating_warnings(runs, scale, heats), *_stroke_warnings(runs, scale, offset)]

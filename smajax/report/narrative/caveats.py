@@ -30,7 +30,7 @@ NAMED_SIZES = 4  # in a sentence
 UNLIKE = 2.0  # by which the noises that outputs leave differ and are more than noise
 NORMAL_95 = 1.96
 UNUSUAL = 5.0  # widths of its prior that an effect is off
-DIFFERENT = "something was different then (the air had another temperature, another day, another state of the wire)"
+DIFFERENT = "something was different then (another day, another state of the wire, air of another temperature, which `per_run` lets each run have of its own)"
 LEAST_SEPARATION = 1.0  # noises by which a run has to separate two models to be worth doing
 
 
@@ -136,10 +136,10 @@ def _truth_beyond(parameters: Sequence[ParameterFinding]) -> Iterator[str]:
     """What it means that parameters of the base model end at a bound; nothing of none."""
     if not parameters:
         return
-    its = "its bounds" if len(parameters) == 1 else "their bounds"
+    its, it = ("its bounds", "it") if len(parameters) == 1 else ("their bounds", "them")
     yield (
-        f"Mind: {and_listed([_ends(one) for one in parameters])}. The truth may lie beyond, and what was fitted beside it makes up for that: widen "
-        f"{its} in the experiment file where physics allows it, or look at what is taken as known."
+        f"Mind: {and_listed([_ends(one) for one in parameters])}. The truth may lie beyond, and what was fitted beside it makes up for that, with "
+        f"standard errors that take {it} as known: widen {its} in the experiment file where physics allows it, or look at what is taken as known."
     )
 
 
