@@ -164,6 +164,30 @@ def test_a_curve_that_the_conditions_kept_the_wire_from_stays_where_the_stress_r
     np.testing.assert_allclose(xi[5], 1.0 - after if cold else after, atol=1e-9)
 
 
+@pytest.mark.parametrize("law", ["enhanced", "liang", "brinson"])
+def test_a_wire_behind_the_end_of_a_range_has_no_curve_of_it(law: str) -> None:
+    """Ranges that overlap under stress: it transforms above A_f', comes back into the heating range, and is heated again."""
+    slopes = {"stress_slope_austenite": 12e6, "stress_slope_martensite": 5e6, "start_fraction": 0.0}
+    crossed = set_parameters(_with(COUPON, law), slopes)
+    run = _driven(crossed, [180.0, 115.0, 50.0, 102.0, 108.0, 112.0], [400e6] * 6)
+    xi = np.asarray(run.martensite_fraction)
+    assert 0.2 < xi[::EACH][4] < 0.3
+    assert xi[-1] == pytest.approx(0.0, abs=1e-9)
+    assert -np.diff(xi).min() < 0.03
+
+
+@pytest.mark.parametrize("law", ["enhanced", "liang"])
+def test_a_wire_that_starts_behind_the_end_of_a_range_goes_on_from_its_fraction(law: str) -> None:
+    begun = set_parameters(_with(COUPON, law), {"start_fraction": 0.5})
+    level = 250e6
+    shift = level / 6.89e6
+    xi = np.asarray(_driven(begun, [180.0, 73.0 + shift, 74.0 + shift, 90.0 + shift], [level] * 4).martensite_fraction)
+    np.testing.assert_allclose(xi[: EACH + 1], 0.5)
+    assert 0.25 < xi[2 * EACH] < 0.49
+    assert xi[-1] == pytest.approx(0.0, abs=1e-9)
+    assert -np.diff(xi).min() < 0.1
+
+
 def _of_wire(state: WireState, **numbers: float) -> WireState:
     return dataclasses.replace(state, **{name: jnp.asarray(value) for name, value in numbers.items()})
 
@@ -171,7 +195,7 @@ def _of_wire(state: WireState, **numbers: float) -> WireState:
 @pytest.mark.parametrize("heating", [True, False])
 @pytest.mark.parametrize("off", [0.0, 1e-6])
 def test_a_corrected_wire_that_was_kept_from_a_curve_goes_on_from_where_it_is(heating: bool, off: float) -> None:
-    """A filter's fraction tells no curve: until the wire follows one, that one is laid through the present state."""
+    """A filter's fraction tells no curve: the next one begins at the present state, and one that it is not put beyond is laid anew until the wire follows it."""
     state = initial_state(COUPON, {"temperature": jnp.asarray(20.0), "stress": jnp.asarray(100e6)}).wire
     share, still = jnp.asarray(0.4), jnp.asarray(False)
     # The wire is at 0.5, on the curve through it, and was kept from one that begins at a fraction of 1 (ends at one of 0).

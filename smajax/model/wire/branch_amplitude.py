@@ -77,7 +77,7 @@ class Corrected(AbstractRenewal):
     is made up for in what is left of the range: all of it, in a fraction of a degree, if hardly any is left. (The
     source's rates would lose it instead and never complete.) If the wire comes back before it may follow, the curve is
     the one of before: a vibration that takes the stress past the point where the wire turned back, and returns it,
-    changes nothing, however far it went. (Where it may follow in between, for however short, it begins anew from there.)
+    changes nothing, however far it went. (Where it follows in between, for however short, it begins anew from there.)
     """
 
     def start(self, h: Scalar, k: Scalar, xi: Scalar) -> Amplitudes:
@@ -105,7 +105,9 @@ class Corrected(AbstractRenewal):
         held = ~heating & ~cooling
         beyond_heating = ~heating & beyond(xi - top * h)
         beyond_cooling = ~cooling & beyond(1.0 - (1.0 - floor) * k - xi)
-        lost_heating, lost_cooling = held & (old.heating_missed < 0.0), held & (old.cooling_missed < 0.0)
+        # Behind the end of a range no curve runs through the wire: that of the other branch is not known from there on.
+        lost_heating = (held & (old.heating_missed < 0.0)) | (cooling & (h <= FINISHED) & (xi > 0.0))
+        lost_cooling = (held & (old.cooling_missed < 0.0)) | (heating & (k <= FINISHED) & (xi < 1.0))
         laid_heating, laid_cooling = xi / jnp.maximum(h, FINISHED), 1.0 - (1.0 - xi) / jnp.maximum(k, FINISHED)
         kept_heating, kept_cooling = jnp.where(heating, old.xi_M, top), jnp.where(cooling, old.xi_A, floor)
         return Amplitudes(
