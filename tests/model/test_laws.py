@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 
 import equinox as eqx
@@ -16,50 +15,21 @@ from hypothesis import strategies as st
 from smajax.core.parameters import get_parameters, set_parameters, set_vector
 from smajax.model.presets import build
 from smajax.model.system import System, initial_state
-from smajax.model.types import WireState
-from smajax.model.wire.branch_amplitude import UNKNOWN, Amplitudes, AsPrinted, Corrected
+from smajax.model.wire.branch_amplitude import AsPrinted, Corrected
 from smajax.model.wire.conditions import BrinsonAsPrinted
 from smajax.model.wire.form import IntegratedForm, RateForm
 from smajax.model.wire.kinetics import austenite_left, martensite_left
 from smajax.model.wire.kinetics_terms import NO_TERMS
-from smajax.model.wire.laws import LAWS, under_law
+from smajax.model.wire.laws import LAWS
 from smajax.model.wire.stiffness import Constant, Mixed, MixedConstantOmega
-from smajax.simulation.compiled import simulate_compiled
 from smajax.simulation.simulate import simulate
+from tests.helpers.driven_coupon import COUPON, EACH, RUN, driven, path, under
 from tests.helpers.machine_code import by_machine_code
 from tests.helpers.often import often
 
-RUN = simulate_compiled
-EACH = 60  # samples a leg
 NAMES = sorted(LAWS)
-AMPLITUDES = [field.name for field in dataclasses.fields(Amplitudes)]
 RENEWALS = {"corrected": Corrected, "printed": AsPrinted}
-
-
-def _with(system: System, law: str = "enhanced", **parts: object) -> System:
-    wire = under_law(system.wire, law)
-    kinetics = {name: part for name, part in parts.items() if name in ("renewal", "conditions")}
-    constitutive = {name: part for name, part in parts.items() if name in ("form", "stiffness")}
-    wire = dataclasses.replace(
-        wire,
-        kinetics=dataclasses.replace(wire.kinetics, **kinetics),
-        constitutive=dataclasses.replace(wire.constitutive, **constitutive),
-    )
-    return dataclasses.replace(system, wire=wire)
-
-
-COUPON = build("flexinol_table_3_2", "coupon", "none")
 STRAINED = build("flexinol_table_3_2", "strain_coupon", "none")
-
-
-def _path(levels: list[float]) -> np.ndarray:
-    return np.interp(np.arange(EACH * (len(levels) - 1) + 1) / EACH, np.arange(len(levels)), levels)
-
-
-def _driven(system: System, temperature: list[float], stress: list[float]):
-    return RUN(system, {"temperature": jnp.asarray(_path(temperature)), "stress": jnp.asarray(_path(stress))}, 1.0)
-
-
 TEMPERATURES = st.lists(st.floats(10.0, 130.0), min_size=7, max_size=7)
 STRESSES = st.lists(st.floats(0.0, 500e6), min_size=7, max_size=7)
 WIRES = st.fixed_dictionaries(
@@ -86,8 +56,8 @@ WIRES = st.fixed_dictionaries(
 def test_fractions_stay_in_range_and_follow_their_branch(
     law: str, renewal: str, temperature: list[float], stress: list[float], wire: dict[str, float], start: float
 ) -> None:
-    system = set_parameters(_with(COUPON, law, renewal=RENEWALS[renewal]()), {**wire, "start_fraction": start})
-    run = _driven(system, temperature, stress)
+    system = set_parameters(under(COUPON, law, renewal=RENEWALS[renewal]()), {**wire, "start_fraction": start})
+    run = driven(system, temperature, stress)
     xi, part = np.asarray(run.martensite_fraction), np.asarray(run.detwinned_fraction)
     assert np.isfinite(run.strain).all()
     assert xi.min() >= -1e-12
@@ -110,13 +80,13 @@ def test_fractions_stay_in_range_and_follow_their_branch(
 @pytest.mark.parametrize("law", NAMES)
 def test_minor_loops_stay_inside_the_major_one_and_close(law: str, inner: list[float], middle: float) -> None:
     """Partial heating and cooling, nested, at constant stress."""
-    system = _with(COUPON, law)
+    system = under(COUPON, law)
     shift = 100e6 / 6.89e6
     heat = lambda share: 68.0 + shift + 10.0 * share  # noqa: E731
     cool = lambda share: 42.0 + shift + 10.0 * share  # noqa: E731
     low, high = cool(min(inner)), heat(max(inner))
     path = [20.0, high, low, heat(middle), cool(middle), high, low, high, 130.0, 20.0]
-    run = _driven(system, path, [100e6] * len(path))
+    run = driven(system, path, [100e6] * len(path))
     xi = np.asarray(run.martensite_fraction)
     at = run.temperature, jnp.asarray(100e6)
     upper = np.asarray(martensite_left(system.wire.kinetics, NO_TERMS, *at))
@@ -132,94 +102,14 @@ def test_minor_loops_stay_inside_the_major_one_and_close(law: str, inner: list[f
 @pytest.mark.parametrize("law", NAMES)
 def test_a_repeated_minor_loop_closes(law: str) -> None:
     """Between two temperatures that each touch one range the fraction comes back to the same two values."""
-    system = _with(COUPON, law)
+    system = under(COUPON, law)
     path = [20.0, 88.0] + [62.0, 88.0] * 12
-    run = _driven(system, path, [100e6] * len(path))
+    run = driven(system, path, [100e6] * len(path))
     turns = np.asarray(run.martensite_fraction)[::EACH]
     hot, cold = turns[1::2], turns[2::2]
     assert abs(hot[-1] - hot[-2]) < 1e-3
     assert abs(cold[-1] - cold[-2]) < 1e-3
     assert cold[-1] > hot[-1] + 0.05
-
-
-@pytest.mark.parametrize("more", [6.9e6, 8e6, 20e6, 200e6])
-@pytest.mark.parametrize("cold", [False, True])
-def test_a_curve_that_the_conditions_kept_the_wire_from_stays_where_the_stress_returns(more: float, cold: bool) -> None:
-    """By Liang's conditions: the stress goes past the point where the wire turned back, against the temperature, and returns."""
-    system = _with(COUPON, "liang")
-    wire, level = system.wire.kinetics, 250e6
-    shift, sign = level / 6.89e6, 1.0 if cold else -1.0
-    turn = (47.0 if cold else 73.0) + shift
-    temperature = [20.0, 140.0] if cold else [20.0]
-    begun = len(temperature)
-    temperature += [turn, turn + sign, turn + 2.0 * sign, turn + 7.0 * sign, turn + 0.1 * sign, turn - 2.0 * sign]
-    stress = [level] * len(temperature)
-    stress[begun + 1] += sign * more
-    xi = np.asarray(_driven(system, temperature, stress).martensite_fraction)[::EACH][begun:]
-    left = austenite_left if cold else martensite_left
-    there, after = (
-        float(left(wire, NO_TERMS, jnp.asarray(one), jnp.asarray(level))) for one in (turn, temperature[-1])
-    )
-    np.testing.assert_allclose(xi[:5], 1.0 - there if cold else there, atol=1e-9)
-    np.testing.assert_allclose(xi[5], 1.0 - after if cold else after, atol=1e-9)
-
-
-@pytest.mark.parametrize("law", ["enhanced", "liang", "brinson"])
-def test_a_wire_behind_the_end_of_a_range_has_no_curve_of_it(law: str) -> None:
-    """Ranges that overlap under stress: it transforms above A_f', comes back into the heating range, and is heated again."""
-    slopes = {"stress_slope_austenite": 12e6, "stress_slope_martensite": 5e6, "start_fraction": 0.0}
-    crossed = set_parameters(_with(COUPON, law), slopes)
-    run = _driven(crossed, [180.0, 115.0, 50.0, 102.0, 108.0, 112.0], [400e6] * 6)
-    xi = np.asarray(run.martensite_fraction)
-    assert 0.2 < xi[::EACH][4] < 0.3
-    assert xi[-1] == pytest.approx(0.0, abs=1e-9)
-    assert -np.diff(xi).min() < 0.03
-
-
-@pytest.mark.parametrize("law", ["enhanced", "liang"])
-def test_a_wire_that_starts_behind_the_end_of_a_range_goes_on_from_its_fraction(law: str) -> None:
-    begun = set_parameters(_with(COUPON, law), {"start_fraction": 0.5})
-    level = 250e6
-    shift = level / 6.89e6
-    xi = np.asarray(_driven(begun, [180.0, 73.0 + shift, 74.0 + shift, 90.0 + shift], [level] * 4).martensite_fraction)
-    np.testing.assert_allclose(xi[: EACH + 1], 0.5)
-    assert 0.25 < xi[2 * EACH] < 0.49
-    assert xi[-1] == pytest.approx(0.0, abs=1e-9)
-    assert -np.diff(xi).min() < 0.1
-
-
-def _of_wire(state: WireState, **numbers: float) -> WireState:
-    return dataclasses.replace(state, **{name: jnp.asarray(value) for name, value in numbers.items()})
-
-
-@pytest.mark.parametrize("heating", [True, False])
-@pytest.mark.parametrize("off", [0.0, 1e-6])
-def test_a_corrected_wire_that_was_kept_from_a_curve_goes_on_from_where_it_is(heating: bool, off: float) -> None:
-    """A filter's fraction tells no curve: the next one begins at the present state, and one that it is not put beyond is laid anew until the wire follows it."""
-    state = initial_state(COUPON, {"temperature": jnp.asarray(20.0), "stress": jnp.asarray(100e6)}).wire
-    share, still = jnp.asarray(0.4), jnp.asarray(False)
-    # The wire is at 0.5, on the curve through it, and was kept from one that begins at a fraction of 1 (ends at one of 0).
-    amplitudes = {"xi_M": 1.25, "heating_missed": 1.0} if heating else {"xi_A": -0.25, "cooling_missed": 1.0}
-    kept = _of_wire(state, martensite_fraction=0.5, **amplitudes)
-    xi = 0.5 + off if heating else 0.5 - off
-
-    def missed(amplitudes: Amplitudes) -> float:
-        return float(amplitudes.heating_missed if heating else amplitudes.cooling_missed)
-
-    def on_curve(amplitudes: Amplitudes, share: jax.Array) -> float:
-        return float(amplitudes.xi_M * share if heating else 1.0 - (1.0 - amplitudes.xi_A) * share)
-
-    after = Corrected().corrected(kept, still, share, share, jnp.asarray(xi))
-    assert missed(after) == (0.0 if off else UNKNOWN)
-    assert on_curve(after, share) == pytest.approx(xi, rel=1e-12)
-    wire = _of_wire(kept, martensite_fraction=xi, **{name: float(getattr(after, name)) for name in AMPLITUDES})
-    if not off:
-        for other in (0.6, 0.9, 0.3):
-            then = Corrected().renewed(wire, still, still, jnp.asarray(other), jnp.asarray(other), jnp.asarray(xi))
-            assert missed(then) == UNKNOWN
-            assert on_curve(then, jnp.asarray(other)) == pytest.approx(xi, rel=1e-12)
-    followed = Corrected().renewed(wire, jnp.asarray(heating), jnp.asarray(not heating), share, share, jnp.asarray(xi))
-    assert missed(followed) == 0.0
 
 
 @settings(max_examples=20, deadline=None)
@@ -233,8 +123,8 @@ def test_integrated_form_is_a_function_of_state(
     temperature: list[float], stress: list[float], law: str, stiffness: object
 ) -> None:
     """sigma = E(xi) (strain - strain_0 + Omega/E xi_s) + theta_T (T - T_0) at every stored sample."""
-    system = _with(COUPON, law, form=IntegratedForm(), stiffness=stiffness)
-    run = _driven(system, temperature, stress)
+    system = under(COUPON, law, form=IntegratedForm(), stiffness=stiffness)
+    run = driven(system, temperature, stress)
     c = system.wire.constitutive
     e_a, e_m, eps_l = c.young_modulus_austenite, c.young_modulus_martensite, c.recoverable_strain
     xi = run.martensite_fraction
@@ -252,7 +142,7 @@ def test_rate_and_integrated_form_agree_where_e_is_constant(
     temperature: list[float], stress: list[float], law: str
 ) -> None:
     rate, integrated = (
-        _driven(_with(COUPON, law, form=form, stiffness=Constant()), temperature, stress)
+        driven(under(COUPON, law, form=form, stiffness=Constant()), temperature, stress)
         for form in (RateForm(), IntegratedForm())
     )
     assert float(np.abs(rate.strain - integrated.strain).max()) < 1e-6 * 0.046
@@ -262,8 +152,8 @@ def test_rate_form_with_mixed_e_does_not_close_and_integrated_form_does() -> Non
     """Why the two forms cannot agree with E(xi): the rate form depends on the path."""
     left = {}
     for form in (RateForm(), IntegratedForm()):
-        system = set_parameters(_with(COUPON, form=form), {"start_fraction": 0.0})
-        run = _driven(system, [95.0, 95.0, 95.0], [0.0, 450e6, 0.0])
+        system = set_parameters(under(COUPON, form=form), {"start_fraction": 0.0})
+        run = driven(system, [95.0, 95.0, 95.0], [0.0, 450e6, 0.0])
         assert run.martensite_fraction[-1] == 0.0
         left[type(form)] = float(run.strain[-1])
     assert abs(left[IntegratedForm]) < 1e-12
@@ -274,7 +164,7 @@ def test_rate_form_with_mixed_e_does_not_close_and_integrated_form_does() -> Non
 @given(at=st.floats(15.0, 110.0), top=st.floats(0.005, 0.07), law=st.sampled_from(NAMES))
 def test_work_of_a_closed_stress_strain_cycle_is_not_negative(at: float, top: float, law: str) -> None:
     """Isothermal cycles of strain from the unloaded wire and back to zero stress, integrated form."""
-    system = _with(STRAINED, law, form=IntegratedForm())
+    system = under(STRAINED, law, form=IntegratedForm())
     system = set_parameters(system, {"start_fraction": 1.0 if at < 60.0 else 0.0})
     strain = np.concatenate([np.linspace(0.0, top, 200), np.linspace(top, 0.0, 200)])
     run = RUN(system, {"temperature": jnp.full(400, at), "strain": jnp.asarray(strain)}, 1.0)
@@ -289,8 +179,8 @@ def test_strain_coupon_inverts_the_stress_coupon(temperature: list[float], stres
     """The strain that a stress path gives, prescribed, gives back the stress path (while the wire is taut)."""
     stress = [0.0, *(20e6 + value for value in stress[1:])]
     temperature = [temperature[0], temperature[0], *temperature[2:]]
-    there = _driven(_with(COUPON, law), temperature, stress)
-    back = RUN(_with(STRAINED, law), {"temperature": jnp.asarray(_path(temperature)), "strain": there.strain}, 1.0)
+    there = driven(under(COUPON, law), temperature, stress)
+    back = RUN(under(STRAINED, law), {"temperature": jnp.asarray(path(temperature)), "strain": there.strain}, 1.0)
     np.testing.assert_allclose(back.martensite_fraction, there.martensite_fraction, atol=1e-5)
     np.testing.assert_allclose(back.stress, there.stress, atol=2e4)
 
@@ -305,9 +195,9 @@ def test_a_strained_wire_that_goes_slack_comes_back_on_its_law(
     temperature: list[float], strain: list[float], law: str
 ) -> None:
     """Free or held shorter than it is the wire carries nothing and transforms on; taut it obeys sigma = E (...)."""
-    system = _with(STRAINED, law, form=IntegratedForm(), stiffness=Mixed())
-    held = np.concatenate([np.zeros(1), _path(strain)])
-    heat = np.concatenate([[23.0], _path(temperature)])
+    system = under(STRAINED, law, form=IntegratedForm(), stiffness=Mixed())
+    held = np.concatenate([np.zeros(1), path(strain)])
+    heat = np.concatenate([[23.0], path(temperature)])
     run = RUN(system, {"temperature": jnp.asarray(heat), "strain": jnp.asarray(held)}, 1.0)
     xi, stress = np.asarray(run.martensite_fraction), np.asarray(run.stress)
     assert np.isfinite(stress).all()
@@ -351,7 +241,7 @@ def test_a_run_in_a_batch_is_the_run_alone(rig: str) -> None:
 
 
 def test_conditions_as_table_3_3_prints_them_transform_nothing_under_a_constant_load() -> None:
-    run = _driven(_with(COUPON, conditions=BrinsonAsPrinted()), [20.0, 130.0, 20.0], [100e6] * 3)
+    run = driven(under(COUPON, conditions=BrinsonAsPrinted()), [20.0, 130.0, 20.0], [100e6] * 3)
     assert np.all(np.asarray(run.martensite_fraction) == 1.0)
 
 
@@ -364,7 +254,7 @@ def test_conditions_as_table_3_3_prints_them_transform_nothing_under_a_constant_
 )
 def test_zero_voltage_rests_for_a_thousand_seconds(rig: str, law: str) -> None:
     wire = "niti_table_3_1" if rig == "arm" else "flexinol_table_3_2"
-    run = RUN(_with(build(wire, rig, "voltage"), law), {"voltage": jnp.zeros(2_001)}, 0.5)
+    run = RUN(under(build(wire, rig, "voltage"), law), {"voltage": jnp.zeros(2_001)}, 0.5)
     ambient = 20.0 if rig == "arm" else 23.0
     assert float(np.abs(run.temperature - ambient).max()) < 1e-9
     assert float(np.abs(run.position - run.position[0]).max()) < 1e-12
@@ -375,7 +265,7 @@ def test_zero_voltage_rests_for_a_thousand_seconds(rig: str, law: str) -> None:
 @settings(max_examples=8, deadline=None)
 @given(levels=st.lists(st.floats(0.0, 12.0), min_size=4, max_size=4), law=st.sampled_from(NAMES))
 def test_no_wire_cools_below_the_ambient_temperature(levels: list[float], law: str) -> None:
-    system = _with(build("flexinol_table_3_2", "dead_weight", "voltage"), law)
+    system = under(build("flexinol_table_3_2", "dead_weight", "voltage"), law)
     volts = jnp.repeat(jnp.asarray(levels), 100)
     assert float(RUN(system, {"voltage": volts}, 0.02).temperature.min()) >= 23.0 - 1e-9
 
@@ -383,12 +273,11 @@ def test_no_wire_cools_below_the_ambient_temperature(levels: list[float], law: s
 @pytest.mark.parametrize("chunks", [2, pytest.param(20, marks=pytest.mark.slow)])
 def test_nothing_drifts_in_a_million_steps(chunks: int) -> None:
     """Taut states satisfy the integrated law to 1e-8 of their stress after 10^5 (slow: 10^6) steps to and fro."""
-    system = _with(build("flexinol_table_3_2", "dead_weight", "voltage"), form=IntegratedForm())
+    system = under(build("flexinol_table_3_2", "dead_weight", "voltage"), form=IntegratedForm())
     chunk = jnp.tile(jnp.concatenate([jnp.full(500, 7.0), jnp.full(500, 0.0)]), 50)
 
     @by_machine_code
     def carried_on(system: System, volts: jax.Array):
-        from smajax.model.system import initial_state
         from smajax.simulation.step import step
 
         def body(state, volt):
