@@ -13,7 +13,6 @@ from smajax.model.types import Trajectory
 from smajax.model.wire.laws import under_law
 from smajax.simulation.compiled import simulate_compiled
 
-RUN = simulate_compiled
 EACH = 60  # samples a leg
 COUPON = build("flexinol_table_3_2", "coupon", "none")
 
@@ -35,4 +34,6 @@ def path(levels: list[float]) -> np.ndarray:
 
 
 def driven(system: System, temperature: list[float], stress: list[float]) -> Trajectory:
-    return RUN(system, {"temperature": jnp.asarray(path(temperature)), "stress": jnp.asarray(path(stress))}, 1.0)
+    return simulate_compiled(
+        system, {"temperature": jnp.asarray(path(temperature)), "stress": jnp.asarray(path(stress))}, 1.0
+    )

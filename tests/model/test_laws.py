@@ -22,8 +22,9 @@ from smajax.model.wire.kinetics import austenite_left, martensite_left
 from smajax.model.wire.kinetics_terms import NO_TERMS
 from smajax.model.wire.laws import LAWS
 from smajax.model.wire.stiffness import Constant, Mixed, MixedConstantOmega
+from smajax.simulation.compiled import simulate_compiled
 from smajax.simulation.simulate import simulate
-from tests.helpers.driven_coupon import COUPON, EACH, RUN, driven, path, under
+from tests.helpers.driven_coupon import COUPON, EACH, driven, path, under
 from tests.helpers.machine_code import by_machine_code
 from tests.helpers.often import often
 
@@ -167,7 +168,7 @@ def test_work_of_a_closed_stress_strain_cycle_is_not_negative(at: float, top: fl
     system = under(STRAINED, law, form=IntegratedForm())
     system = set_parameters(system, {"start_fraction": 1.0 if at < 60.0 else 0.0})
     strain = np.concatenate([np.linspace(0.0, top, 200), np.linspace(top, 0.0, 200)])
-    run = RUN(system, {"temperature": jnp.full(400, at), "strain": jnp.asarray(strain)}, 1.0)
+    run = simulate_compiled(system, {"temperature": jnp.full(400, at), "strain": jnp.asarray(strain)}, 1.0)
     assert np.isfinite(run.stress).all()
     assert np.trapezoid(run.stress, strain) >= -1e-3 * float(run.stress.max()) * top
 
@@ -180,7 +181,9 @@ def test_strain_coupon_inverts_the_stress_coupon(temperature: list[float], stres
     stress = [0.0, *(20e6 + value for value in stress[1:])]
     temperature = [temperature[0], temperature[0], *temperature[2:]]
     there = driven(under(COUPON, law), temperature, stress)
-    back = RUN(under(STRAINED, law), {"temperature": jnp.asarray(path(temperature)), "strain": there.strain}, 1.0)
+    back = simulate_compiled(
+        under(STRAINED, law), {"temperature": jnp.asarray(path(temperature)), "strain": there.strain}, 1.0
+    )
     np.testing.assert_allclose(back.martensite_fraction, there.martensite_fraction, atol=1e-5)
     np.testing.assert_allclose(back.stress, there.stress, atol=2e4)
 
@@ -198,7 +201,7 @@ def test_a_strained_wire_that_goes_slack_comes_back_on_its_law(
     system = under(STRAINED, law, form=IntegratedForm(), stiffness=Mixed())
     held = np.concatenate([np.zeros(1), path(strain)])
     heat = np.concatenate([[23.0], path(temperature)])
-    run = RUN(system, {"temperature": jnp.asarray(heat), "strain": jnp.asarray(held)}, 1.0)
+    run = simulate_compiled(system, {"temperature": jnp.asarray(heat), "strain": jnp.asarray(held)}, 1.0)
     xi, stress = np.asarray(run.martensite_fraction), np.asarray(run.stress)
     assert np.isfinite(stress).all()
     assert stress.min() >= 0.0
@@ -254,7 +257,7 @@ def test_conditions_as_table_3_3_prints_them_transform_nothing_under_a_constant_
 )
 def test_zero_voltage_rests_for_a_thousand_seconds(rig: str, law: str) -> None:
     wire = "niti_table_3_1" if rig == "arm" else "flexinol_table_3_2"
-    run = RUN(under(build(wire, rig, "voltage"), law), {"voltage": jnp.zeros(2_001)}, 0.5)
+    run = simulate_compiled(under(build(wire, rig, "voltage"), law), {"voltage": jnp.zeros(2_001)}, 0.5)
     ambient = 20.0 if rig == "arm" else 23.0
     assert float(np.abs(run.temperature - ambient).max()) < 1e-9
     assert float(np.abs(run.position - run.position[0]).max()) < 1e-12
@@ -267,7 +270,7 @@ def test_zero_voltage_rests_for_a_thousand_seconds(rig: str, law: str) -> None:
 def test_no_wire_cools_below_the_ambient_temperature(levels: list[float], law: str) -> None:
     system = under(build("flexinol_table_3_2", "dead_weight", "voltage"), law)
     volts = jnp.repeat(jnp.asarray(levels), 100)
-    assert float(RUN(system, {"voltage": volts}, 0.02).temperature.min()) >= 23.0 - 1e-9
+    assert float(simulate_compiled(system, {"voltage": volts}, 0.02).temperature.min()) >= 23.0 - 1e-9
 
 
 @pytest.mark.parametrize("chunks", [2, pytest.param(20, marks=pytest.mark.slow)])

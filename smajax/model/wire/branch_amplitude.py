@@ -27,8 +27,13 @@ def beyond(gap: Scalar) -> Bool[Array, ""]:
     return gap > max(REST, ROUNDINGS * float(jnp.finfo(gap.dtype).eps))
 
 
-# Of an amplitude that nobody knows: a wire that starts beyond the end of a range.
+# Of an amplitude that nobody knows: a wire that starts, or transforms the other way, beyond the end of a range (`behind`).
 UNKNOWN = -1.0
+
+
+def behind(share: Scalar, amount: Scalar) -> Bool[Array, ""]:
+    """Whether the range that leaves `share` is over while there is an `amount` of the phase yet: no curve of it runs through the wire."""
+    return (share <= FINISHED) & (amount > 0.0)
 
 
 class Amplitudes(eqx.Module):
@@ -85,8 +90,8 @@ class Corrected(AbstractRenewal):
         return Amplitudes(
             xi / jnp.maximum(h, FINISHED),
             jnp.where(xi >= 1.0, 0.0, floor),
-            jnp.where((h <= FINISHED) & (xi > 0.0), UNKNOWN, 0.0),
-            jnp.where((k <= FINISHED) & (xi < 1.0), UNKNOWN, 0.0),
+            jnp.where(behind(h, xi), UNKNOWN, 0.0),
+            jnp.where(behind(k, 1.0 - xi), UNKNOWN, 0.0),
         )
 
     def curves(self, old: WireState, h_old: Scalar, k_old: Scalar, h: Scalar, k: Scalar) -> tuple[Scalar, Scalar]:
@@ -105,9 +110,8 @@ class Corrected(AbstractRenewal):
         held = ~heating & ~cooling
         beyond_heating = ~heating & beyond(xi - top * h)
         beyond_cooling = ~cooling & beyond(1.0 - (1.0 - floor) * k - xi)
-        # Behind the end of a range no curve runs through the wire: that of the other branch is not known from there on.
-        lost_heating = (held & (old.heating_missed < 0.0)) | (cooling & (h <= FINISHED) & (xi > 0.0))
-        lost_cooling = (held & (old.cooling_missed < 0.0)) | (heating & (k <= FINISHED) & (xi < 1.0))
+        lost_heating = (held & (old.heating_missed < 0.0)) | (cooling & behind(h, xi))
+        lost_cooling = (held & (old.cooling_missed < 0.0)) | (heating & behind(k, 1.0 - xi))
         laid_heating, laid_cooling = xi / jnp.maximum(h, FINISHED), 1.0 - (1.0 - xi) / jnp.maximum(k, FINISHED)
         kept_heating, kept_cooling = jnp.where(heating, old.xi_M, top), jnp.where(cooling, old.xi_A, floor)
         return Amplitudes(
