@@ -11,6 +11,7 @@ from smajax.control.gains_file import Gains, read_gains
 from smajax.control.load_equation import moving_load
 from smajax.control.loop_dataset import Loop
 from smajax.control.measured_state import Sensor
+from smajax.control.perturbed_plant import commanded_as
 from smajax.control.presets import CONTROLLERS, check_controller, filter_of
 from smajax.core.names import close_matches
 from smajax.core.units import UnitError, parse_quantity
@@ -42,6 +43,7 @@ def loop_around(
     controller needs: which controller, which load, what is missing, which controllers can.
     """
     believed = system if assumed is None else assumed
+    system = commanded_as(system, believed)
     own = moving_load(system).reading[1]
     sigma, steps = (parse_quantity(one, own, bare=own) for one in (noise, quantum))
     sensor = Sensor(noise_sigma=sigma, quantum=steps) if sigma or steps else None

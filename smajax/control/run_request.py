@@ -36,6 +36,7 @@ from smajax.control.model_as_plant import (
     true_plant,
     with_limit,
 )
+from smajax.control.perturbed_plant import commanded_as
 from smajax.control.position_unit import PositionUnit, unit_of
 from smajax.control.presets import CONTROLLERS, check_controller
 from smajax.control.reference import Reference
@@ -328,6 +329,7 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
             if loop.plant is None
             else true_plant(loop.plant, loop.mismatch, assumed, gains.controller)
         )
+    plant = commanded_as(plant, assumed)
     unit = unit_of(assumed)
     sigma, quantum = (float(unit.of(one)) for one in sensor)
     between = own.estimator, sigma, own.period
