@@ -28,7 +28,7 @@ def test_the_increment_of_a_staircase_is_found(share: float) -> None:
 
 
 @pytest.mark.parametrize("samples", [200, 800, 8000])
-@pytest.mark.parametrize("noises", [9.5, 11.0, 25.0])
+@pytest.mark.parametrize("noises", [6.0, 7.5, 9.5, 11.0, 25.0])
 def test_levels_are_found_however_many_samples_show_their_noise(noises: float, samples: int) -> None:
     rng, increment = np.random.default_rng(5), 0.05 * 1e-2
     logs = [

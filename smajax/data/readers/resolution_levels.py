@@ -14,7 +14,8 @@ from smajax.data.readers.table import Array
 LEAST = 4.0  # noises: an increment that is smaller leaves no gaps
 FEWEST = 3  # levels over the stroke
 CELLS = 8  # into which the smallest increment is cut: half a noise each
-ON_LEVELS = 0.75  # of the periodogram: normal noise about levels 8.3 noises apart, exp(-2 pi^2 / 8.3^2)
+# Of what normal noise about levels leaves of the periodogram, exp(-2 pi^2 sigma^2 / q^2): 0.6 at levels 6.2 noises apart, 0.98 at 30.
+ON_LEVELS = 0.75
 CHANCE = (
     0.01  # of readings that lie anywhere, at most, to look like that at any increment from the largest to the one found
 )
@@ -40,7 +41,8 @@ def likeliest_increment(readings: Sequence[Array], sigma: float) -> float:
     not how long the reading rests at its ends, every reading weighs one over the number of those within half an increment of it:
     the weights of a run add up to the levels that it was on. Of a run with m levels the squared sum of turns over m has by chance
     the exponential distribution, and several runs' together that of the sum (Scargle 1982). Rests at even distances, as of a staircase of
-    set points, are told from levels by the way between them: a sensor's readings are on levels there too, but for one at each change.
+    set points, are told from levels by the way between them: a sensor's readings are on levels there too, but for one at each change. Less than
+    seven noises apart no reading is between levels, and such rests count as levels.
     """
     stroke = max(float(np.ptp(one)) for one in readings)
     finest = max(LEAST * sigma, stroke * FINENESS / MOST)
@@ -52,7 +54,12 @@ def likeliest_increment(readings: Sequence[Array], sigma: float) -> float:
     tried = 1.0 + best / FINENESS
     chance = tried * float(scipy.special.gammaincc(len(readings), surprise[best]))
     increment = float(1.0 / frequency[best])
-    found = strength[best] > ON_LEVELS and chance < CHANCE and _on_levels_throughout(readings, increment, sigma)
+    all_on_levels = math.exp(-2.0 * (math.pi * sigma / increment) ** 2)
+    found = (
+        strength[best] > ON_LEVELS * all_on_levels
+        and chance < CHANCE
+        and _on_levels_throughout(readings, increment, sigma)
+    )
     return increment if found else 0.0
 
 
