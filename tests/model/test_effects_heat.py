@@ -71,11 +71,11 @@ def test_a_specific_heat_by_phase_changes_the_time_and_not_the_end_state() -> No
     assert rates[0] / rates[1] == pytest.approx(1.3, rel=1e-3)
 
 
-@pytest.mark.parametrize("share", [0.0, 1.0])
-def test_the_latent_heat_is_constant_or_follows_kirchhoff(share: float) -> None:
-    """Heat put in over a transformation: that of the phases' specific heats on the way, and k times Kirchhoff's change."""
+@pytest.mark.parametrize(("contrast", "share", "counted"), [(0.3, 0.0, 0.0), (0.3, 1.0, 1.0), (0.9, 1.0, 1.0 / 3.0)])
+def test_the_latent_heat_is_constant_or_follows_kirchhoff(contrast: float, share: float, counted: float) -> None:
+    """Heat put in over a transformation: that of the phases' specific heats on the way, and k times Kirchhoff's change, of a contrast beyond 0.3 that of 0.3."""
     system = RIGS["dead_weight"][0]
-    on = {"phase_specific_heat.contrast": 0.3, "phase_specific_heat.kirchhoff": share}
+    on = {"phase_specific_heat.contrast": contrast, "phase_specific_heat.kirchhoff": share}
     dt, volts = 2e-3, 8.0
     run = simulate_compiled(
         extended(system, ("phase_specific_heat",), on), {"voltage": jnp.full(round(20.0 / dt) + 1, volts)}, dt
@@ -88,10 +88,10 @@ def test_the_latent_heat_is_constant_or_follows_kirchhoff(share: float) -> None:
     m_c = float(mass_per_metre(wire) * wire.heat.specific_heat)
     law = wire.kinetics
     neutral = 0.5 * float(law.martensite_start + law.austenite_finish)
-    own = m_c * np.trapezoid(1.0 + 0.3 * (1.0 - fraction), temperature)
-    change = -0.3 * m_c * np.trapezoid(temperature - neutral, fraction)
+    own = m_c * np.trapezoid(1.0 + contrast * (1.0 - fraction), temperature)
+    change = -contrast * m_c * np.trapezoid(temperature - neutral, fraction)
     assert abs(change) > 0.01 * own
-    assert given == pytest.approx(own + share * change, rel=1e-3)
+    assert given == pytest.approx(own + counted * change, rel=1e-3)
 
 
 def test_heat_lost_to_the_ends_is_that_of_a_fin() -> None:

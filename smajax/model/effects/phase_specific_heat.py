@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+import jax.numpy as jnp
+
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
 from smajax.model.effects.candidate import Candidate, Extent, Width
 from smajax.model.types import Scalar
 from smajax.model.wire.heat import HeatState, HeatTerm, mass_per_metre
 from smajax.model.wire.wire import Wire
+
+# Kirchhoff's change of the latent heat alone, far from T_0, would turn a transformation into a jump.
+MOST_KIRCHHOFF = 0.3
 
 
 def _grid(extent: Extent) -> tuple[dict[str, float], ...]:
@@ -22,11 +27,11 @@ class PhaseSpecificHeat(AbstractEffect, HeatTerm):
     With k = 1 heat is a function of the state, $m c_p^M a (1 - \xi)(T - T_0)$ beside the base model's, and the heat of
     transformation changes with temperature; it is that of the base model at $T_0 = (M_s + A_f)/2$ (Tong and Wayman 1974).
     With k = 0 it stays that of the base model at any temperature: $m c_p(\xi) \dot T$ in eq. 3.1 and no more, as a specific
-    heat of each phase and one latent heat are commonly put together.
+    heat of each phase and one latent heat are commonly put together. Of a change beyond 0.3, k is at most 0.3 / |a|: more would
+    turn a transformation far from T_0 into a jump.
     """
 
-    # Beyond this the change of the latent heat alone, far from T_0, would turn a transformation into a jump.
-    contrast: Scalar = parameter("-", -0.3, 0.3, "a: relative change of c_p from martensite to austenite", default=0.0)
+    contrast: Scalar = parameter("-", -0.5, 1.0, "a: relative change of c_p from martensite to austenite", default=0.0)
     kirchhoff: Scalar = parameter(
         "-", 0.0, 1.0, "k: share of Kirchhoff's change of the heat of transformation", default=1.0
     )
@@ -60,4 +65,5 @@ class PhaseSpecificHeat(AbstractEffect, HeatTerm):
 
     def heat_loss(self, wire: Wire, at: HeatState) -> Scalar | float:
         there = self._more(wire, 0.5 * (at.old.temperature + at.temperature))
-        return (1.0 - self.kirchhoff) * there * (at.fraction - at.old.martensite_fraction) / at.duration
+        share = self.kirchhoff * (MOST_KIRCHHOFF / jnp.maximum(jnp.abs(self.contrast), MOST_KIRCHHOFF))
+        return (1.0 - share) * there * (at.fraction - at.old.martensite_fraction) / at.duration
