@@ -6,9 +6,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
-from smajax.core.parameters import parameters
+from smajax.core.names import close_matches
+from smajax.core.parameters import parameter_values, parameters
 from smajax.core.units import UnitError, parse_quantity
 from smajax.model.load.arm import Arm
 from smajax.model.system import System
@@ -24,6 +25,7 @@ MISMATCHES = {
 }
 # The same of other loads and drives, and of a user's own: what their parameters are called.
 _OTHER = {"inertia": ("slider_mass",), "payload": ("load_mass",), "supply": ("supply_voltage",)}
+_NO_MISMATCH = ("start_fraction", "start_temperature")
 MINUS, BOTH = "\N{MINUS SIGN}", "\N{PLUS-MINUS SIGN}"
 _SIZE = r"\s*(\d+\.?\d*|\.\d+)\s*%\s*"
 _ONE_WAY = re.compile(rf"\s*([-+{MINUS}]){_SIZE}")
@@ -31,17 +33,46 @@ _BOTH_WAYS = re.compile(rf"\s*(?:{BOTH}|\+\s*/?\s*[-{MINUS}]){_SIZE}")
 _UNSIGNED = re.compile(_SIZE)
 
 
-def mismatches_of(system: System) -> dict[str, str]:
-    """`MISMATCHES` of a plant: of the arm those; of another one those that it has, then its load's other parameters by their names."""
-    if isinstance(system.load, Arm):
-        return dict(MISMATCHES)
+def mismatches_of(system: System, asked: Sequence[str] = ()) -> dict[str, str]:
+    """`MISMATCHES` of a plant: of the arm those; of another one those that it has, then its load's other parameters by their names.
+
+    asked: names of other parameters, of which those that a ratio changes (`of_a_ratio`) are added.
+    """
     there = parameters(system)
-    result: dict[str, str] = {}
-    for short, own in MISMATCHES.items():
-        found = next((name for name in (own, *_OTHER.get(short, ())) if name in there), "")
-        if found:
-            result[short] = found
-    return result | {name: name for name in parameters(system.load) if name not in result.values()}
+    result: dict[str, str] = dict(MISMATCHES) if isinstance(system.load, Arm) else {}
+    if not result:
+        for short, own in MISMATCHES.items():
+            found = next((name for name in (own, *_OTHER.get(short, ())) if name in there), "")
+            if found:
+                result[short] = found
+        result |= {name: name for name in parameters(system.load) if name not in result.values()}
+    more = of_a_ratio(system) if asked else ()
+    return result | {name: name for name in asked if name in more and name not in {*result, *result.values()}}
+
+
+def of_a_ratio(system: System) -> tuple[str, ...]:
+    """Parameters of a plant that a ratio changes: none that is zero, a temperature (of which a share tells nothing), or the state at the start."""
+    table = parameters(system)
+    return tuple(
+        name
+        for name, value in parameter_values(system).items()
+        if value != 0.0 and table[name].unit != "degC" and name not in _NO_MISMATCH
+    )
+
+
+def check_known(names: Sequence[str], system: System) -> None:
+    """Raise ValueError for a name that is neither of `mismatches_of` nor of `of_a_ratio`."""
+    known = {*mismatches_of(system), *of_a_ratio(system)}
+    for name in names:
+        if name in known:
+            continue
+        if name in parameters(system):
+            zero = parameter_values(system)[name] == 0.0
+            raise ValueError(
+                f"`{name}` is {'0' if zero else 'a temperature, or of the start'}: a ratio of it changes nothing, or tells nothing. Give values in a batch "
+                "of plants: `plants=` in Python."
+            )
+        raise ValueError(f"no mismatch `{name}`{close_matches(name, sorted(known), 'there are')}.")
 
 
 def default_mismatches(system: System) -> tuple[str, str]:

@@ -61,15 +61,15 @@ def carrying(system: System, plants: Plants | None) -> System:
     return with_effects(system, [name for name in named if name in LIBRARY])
 
 
-def plant_set(system: System, plants: Plants | None = None) -> PlantSet:
-    """The mismatches of a plant, or a batch of plants in their place, which may have effects that the system lacks (`carrying`).
+def plant_set(system: System, plants: Plants | None = None, asked: Sequence[str] = ()) -> PlantSet:
+    """The mismatches of a plant (with those that are `asked`, `mismatches_of`), or a batch of plants in their place, which may have effects that the system lacks (`carrying`).
 
     Raises ValueError for a batch that has no plant, parameters that the system has not, values out of their bounds, lists of
     different lengths, and systems that differ in more than their parameters.
     """
     unit, system = unit_of(system), carrying(system, plants)
     if plants is None:
-        mismatches = mismatches_of(system)
+        mismatches = mismatches_of(system, asked)
         return PlantSet(Perturbation(tuple(mismatches), tuple(mismatches.values())), unit, np.ones(len(mismatches)))
     values = _values(system, plants)
     names = tuple(values)

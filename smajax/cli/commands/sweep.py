@@ -74,7 +74,7 @@ class _Options:
 
     def mismatches(self, plant: System) -> tuple[str, ...]:
         """The names of --over, none without the option. Raises typer.BadParameter."""
-        from smajax.control.mismatch import mismatches_of, short_name
+        from smajax.control.mismatch import check_known, mismatches_of, short_name
         from smajax.control.sweep.grid import check_mismatches
 
         if self.over is None:
@@ -86,7 +86,8 @@ class _Options:
             )
         names = tuple(short_name(part.strip()) for part in self.over.strip(" ,").split(","))
         with refused("--over"):
-            check_mismatches(names, tuple(mismatches_of(plant)))
+            check_known(names, plant)
+            check_mismatches(names, tuple(mismatches_of(plant, names)))
         if len(names) > AXES and self.points:
             raise typer.BadParameter(
                 f"are the sides of a map, and {len(names)} mismatches are on plants spread over all of them: give --plants, their number.",
@@ -257,7 +258,8 @@ def sweep(
     What can differ between the plant and the controller's model: inertia (inertia_ratio), damping, convection
     (convection_coefficient), ambient (ambient_temperature, in degC), payload (payload_mass), supply (amplifier_gain).
     +20% is 1.2 times the value that the controller assumes (of 20 degC: 24 degC), -50% half of it, and 20% of a variation
-    is both ways. Of another load than the arm: those of these that it has, and its other parameters by their names.
+    is both ways. Of another load than the arm those of these that it has. Any other parameter of the plant goes by its own name, such as
+    specific_heat or spring_stiffness, but a temperature, of which a ratio tells nothing.
 
     Example:  smajax sweep --controllers pid,sld --over convection,ambient --out sweep
 

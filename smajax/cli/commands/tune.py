@@ -88,13 +88,14 @@ def _limit_of(gains: Gains | None, plant: System, given: bool) -> dict[str, floa
 
 def _variation(several: Sequence[str] | None, plant: System) -> dict[str, float]:
     """Raises typer.BadParameter."""
-    from smajax.control.mismatch import variation_of
+    from smajax.control.mismatch import check_known, variation_of
     from smajax.control.plants import plant_set
     from smajax.control.tune.scenarios import check_variation
 
     try:
         variation = variation_of(texts("--variation", several, "damping=20%,payload=50%"))
-        check_variation(variation, plant_set(plant))
+        check_known(tuple(variation), plant)
+        check_variation(variation, plant_set(plant, None, tuple(variation)))
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint="--variation") from None
     return variation
@@ -275,7 +276,8 @@ def tune(
     What can differ between the plant and the controller's model: inertia (inertia_ratio), damping, convection
     (convection_coefficient), ambient (ambient_temperature, in degC), payload (payload_mass), supply (amplifier_gain).
     +20% is 1.2 times the value that the controller assumes (of 20 degC: 24 degC), -50% half of it, and 20% of a variation
-    is both ways. Of another load than the arm: those of these that it has, and its other parameters by their names.
+    is both ways. Of another load than the arm those of these that it has. Any other parameter of the plant goes by its own name, such as
+    specific_heat or spring_stiffness, but a temperature, of which a ratio tells nothing.
 
     Example:  smajax tune pid --wire flexinol_table_3_2 --load dead_weight --drive flexinol_voltage --set-point 5mm,12mm,20mm
 

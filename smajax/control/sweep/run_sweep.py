@@ -83,6 +83,11 @@ class SweepSettings:
         return Grid(self.first, self.second, sweep_ratios(self.points, *self.ratio_range), targets, gains, plants)
 
     @property
+    def mismatches(self) -> tuple[str, ...]:
+        """The names that are swept over."""
+        return tuple(name for name in (self.first, self.second) if name)
+
+    @property
     def line_ratios(self) -> tuple[float, ...]:
         """Plant over model of the lines: `LINES`, or as far between 1 and the ends of another range."""
         ends = [self.ratio_range[0] if ratio < 1.0 else self.ratio_range[1] for ratio in LINES]
@@ -122,7 +127,7 @@ class SweepSettings:
             raise ValueError(
                 f"gains are given for {', '.join(unused)}, and only {', '.join(self.controllers)} are swept."
             )
-        found = plant_set(system, plants)
+        found = plant_set(system, plants, self.mismatches)
         _ = self.grid_on(found)  # it checks itself
         return found
 
@@ -215,7 +220,7 @@ def assumed_air(system: System) -> float:
 
 def begun_sweep(system: System, settings: SweepSettings, plants: Plants | None = None) -> SweepResults:
     """A sweep of which no controller is finished. Raises ValueError as `SweepSettings.grid_on`."""
-    found = plant_set(system, plants)
+    found = plant_set(system, plants, settings.mismatches)
     target = line_target(system, settings.grid_on(found))
     return SweepResults(settings, (), assumed_air(system), target, found)
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from smajax.control.mismatch import mismatches_of, short_name
+from smajax.control.mismatch import check_known, mismatches_of, short_name
 from smajax.control.sweep.grid import LEAST, MOST, check_mismatches, check_ratios, ratios_at
 from smajax.core.parameters import get_parameters
 from smajax.core.sobol import sobol_points
@@ -25,10 +25,11 @@ def spread_plants(
     for an unknown mismatch, the same twice, one that is zero where the controller assumes it, no plant, and ratios that do not go from below
     1 to above 1.
     """
-    table = mismatches_of(system)
     if isinstance(mismatches, str):
         raise ValueError(f"got {mismatches!r}, expected several names such as ('inertia', 'damping', 'convection').")
     asked = [short_name(name) for name in mismatches]
+    check_known(asked, system)
+    table = mismatches_of(system, asked)
     check_mismatches(asked, tuple(table))
     check_ratios(least, most)
     if count < 1 or int(count) != count:

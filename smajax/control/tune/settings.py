@@ -82,7 +82,7 @@ class TuneSettings:
         check_set_points(system, self.set_points)
         if len(set(self.set_points)) < len(self.set_points):
             raise ValueError(f"every set point once, not {', '.join(f'{angle:g}' for angle in self.set_points)}.")
-        found = plant_set(system, plants)
+        found = plant_set(system, plants, tuple(self.variation))
         check_variation(self.variation, found)
         if self.batch != (0 if found.batch is None else len(found.batch)):
             raise ValueError(

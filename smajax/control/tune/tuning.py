@@ -80,7 +80,7 @@ class TuningResult:
 
 def problem_of(system: System, settings: TuneSettings, plants: PlantSet | None = None) -> TuningProblem:
     """The controller on its plant; batches no larger than a round needs. plants: by default the plant's mismatches."""
-    plants = plant_set(system) if plants is None else plants
+    plants = plant_set(system, None, tuple(settings.variation)) if plants is None else plants
     preset = CONTROLLERS[settings.controller]
     plant = preset.plant(system)
     if settings.fixed:

@@ -1,0 +1,78 @@
+"""Sweeps and tuning over any parameter of a plant that a ratio changes, by its own name."""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from smajax.control.mismatch import MISMATCHES, check_known, mismatches_of, of_a_ratio
+from smajax.control.perturbed_plant import perturbed_plant
+from smajax.control.plants import plant_set
+from smajax.control.sweep.run_sweep import sweep_settings_for
+from smajax.control.sweep.spread_plants import spread_plants
+from smajax.control.tune.scenarios import tuned_on
+from smajax.control.tune.settings import settings_for
+from smajax.core.parameters import parameter_values, parameters
+from smajax.model.presets import build
+
+PLANTS = {
+    "arm": build("niti_table_3_1", "arm", "amplified_voltage"),
+    "bias_spring": build("flexinol_ht_500um", "bias_spring", "voltage"),
+}
+ASKED = ("specific_heat", "recoverable_strain")
+
+
+@pytest.mark.parametrize("load", PLANTS)
+def test_what_is_asked_for_is_a_mismatch_beside_those_of_the_load(load: str) -> None:
+    plant = PLANTS[load]
+    own = mismatches_of(plant)
+    assert mismatches_of(plant, ASKED) == own | {name: name for name in ASKED}
+    assert mismatches_of(plant, ["convection_coefficient", "austenite_start"]) == own
+    table, there = parameters(plant), of_a_ratio(plant)
+    assert {"specific_heat", "stress_slope_austenite", "wire_diameter"} <= set(there)
+    assert not [name for name in there if table[name].unit == "degC" or parameter_values(plant)[name] == 0.0]
+
+
+@pytest.mark.parametrize(
+    ("name", "said"), [("austenite_start", "a temperature"), ("specific_haet", "did you mean 'specific_heat'")]
+)
+def test_what_no_ratio_changes_is_refused_by_name(name: str, said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        check_known([name], PLANTS["arm"])
+    with pytest.raises(ValueError, match=said):
+        spread_plants(PLANTS["arm"], [*MISMATCHES, name], 4)
+
+
+def test_a_swept_loop_runs_on_the_plant_that_its_row_says() -> None:
+    plant = PLANTS["bias_spring"]
+    settings = sweep_settings_for(plant, ["pid"], first=ASKED[0], second=ASKED[1], points=3)
+    found = settings.check(plant)
+    rows = settings.grid_on(found).rows()
+    heat, strain = (rows[:, found.columns.index(name)] for name in ASKED)
+    assert {(0.5, 2.0), (2.0, 0.5), (1.0, 1.0)} <= set(zip(heat.tolist(), strain.tolist(), strict=True))
+    assert np.all(np.delete(rows[:, : len(found.columns)], [found.columns.index(one) for one in ASKED], axis=1) == 1.0)
+    row = rows[np.flatnonzero((heat == 2.0) & (strain == 0.5))[0]]
+    values = dict(zip(found.columns, map(jnp.asarray, row), strict=False))
+    true, believed = parameter_values(perturbed_plant(plant, values, found.perturbation)), parameter_values(plant)
+    assert {name: true[name] / believed[name] for name in ASKED} == pytest.approx(dict(zip(ASKED, (2.0, 0.5), strict=True)))
+    assert {name for name in true if true[name] != pytest.approx(believed[name])} == set(ASKED)
+
+
+def test_gains_are_tuned_on_the_corners_of_what_is_asked_for() -> None:
+    plant, variation = PLANTS["arm"], {"specific_heat": 0.2, "damping": 0.1}
+    settings = settings_for(plant, "pid", variation=variation)
+    found = settings.check(plant)
+    assert found.columns == (*MISMATCHES, "specific_heat")
+    rows = tuned_on([20.0], variation, 0, found).rows
+    corners = rows[:, [found.columns.index(name) for name in variation]]
+    assert set(map(tuple, corners.round(9).tolist())) == {(1.0, 1.0), (0.8, 0.9), (0.8, 1.1), (1.2, 0.9), (1.2, 1.1)}
+
+
+def test_more_than_two_are_spread_plants() -> None:
+    plant = PLANTS["bias_spring"]
+    several = spread_plants(plant, [*ASKED, "convection"], 8)
+    assert set(several) == {*ASKED, "convection_coefficient"}
+    batch = plant_set(plant, several).batch
+    assert batch is not None
+    assert batch.shape == (8, 3)
