@@ -11,6 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from smajax.control.controller_call import check_is_controller, commanded
 from smajax.control.controllers.base import AbstractController
 from smajax.control.estimators.base import AbstractEstimator
 from smajax.control.measured_state import MeasuredState, Sensor, truth
@@ -98,6 +99,7 @@ class ClosedLoopSetup(eqx.Module):
 
     def check(self) -> None:
         """ValueError for what is out of bounds, of another length, or not finite where it is known."""
+        check_is_controller(self.controller)
         check_bounds(self.system)
         check_bounds(self.controller)
         refuse_lag(self.system, "a closed loop")
@@ -210,7 +212,8 @@ def simulate_closed_loop(  # the public form: what goes inwards is a `ClosedLoop
     `integration`: how finely between two samples; error-controlled steps have derivatives in forward mode alone.
 
     Raises ValueError when a gain, a parameter or the sensor's noise lies outside its bounds, when `dt` is not positive or a set point
-    not finite (where values are known: outside of `jit`), when `wanted` is not a whole number of control periods and one sample more, and when noise has no `key`.
+    not finite (where values are known: outside of `jit`), when `wanted` is not a whole number of control periods and one sample more, and when noise has no `key`; TypeError for what is no controller, and
+    one whose `step` JAX cannot trace (`controller_call.commanded`).
     """
     between = (estimator, sensor, key, delay, disturbance)
     return stored_loop(ClosedLoopSetup(system, controller, wanted, dt, every, *between, initial, integration))
@@ -271,7 +274,7 @@ def _control(setup: ClosedLoopSetup, start: State) -> Control:
             pick = lambda one, other: jnp.where(at_start, one, other)  # noqa: E731
             estimate = jax.tree.map(pick, memory.estimate, later)
             measured = jax.tree.map(pick, estimator.start(reading)[1], after)
-        own, answer = controller.step(memory.controller, measured, wanted, period)
+        own, answer = commanded(controller, memory.controller, measured, wanted, period)
         failed_at = jnp.minimum(memory.failed_at, jnp.where(jnp.isfinite(answer), jnp.inf, state.time))
         queue = jnp.append(memory.queue, jnp.where(jnp.isfinite(failed_at), 0.0, answer))
         held, queue = queue[0], queue[1:]

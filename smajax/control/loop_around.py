@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+from smajax.control.controller_call import check_is_controller
 from smajax.control.controllers.base import AbstractController
 from smajax.control.estimators.base import AbstractEstimator
 from smajax.control.gains_file import Gains, read_gains
@@ -38,7 +39,7 @@ def loop_around(
     (`reading_noise`), 0 leaves it its preset's (`presets.filter_of`); one of one's own keeps what it has, and `printed` the R of its preset. quantum: step between two readings, likewise; 0: none. delay: control periods until a command arrives. assumed: the plant that
     controller and filter know; by default the system itself.
 
-    Raises KeyError for a controller or filter there is not, GainsFileError for a file that cannot be used, UnitError for a
+    Raises KeyError for a controller or filter there is not, TypeError for what is neither a controller nor a name, GainsFileError for a file that cannot be used, UnitError for a
     unit of another kind, ValueError for a gain there is not, and where the load or the drive does not give what the
     controller needs: which controller, which load, what is missing, which controllers can.
     """
@@ -52,6 +53,8 @@ def loop_around(
         if gains is not None:
             raise ValueError("gains go with the name of a controller: a controller of one's own has its gains already.")
         return Loop(system, controller, filtered, sensor, delay)
+    if not isinstance(controller, str):
+        check_is_controller(controller)
     if controller not in CONTROLLERS:
         raise KeyError(f"no controller {controller!r}{close_matches(controller, CONTROLLERS, 'there are')}")
     check_controller(controller, believed)

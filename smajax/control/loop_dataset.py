@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import warnings
 from collections.abc import Mapping
 
@@ -36,7 +37,7 @@ SAMPLED = "sampled"  # attribute of a `reading` that is no state of the plant: t
 
 
 class SetPointWarning(UserWarning):
-    """A set point lies beyond the load's end stops."""
+    """A set point lies beyond the end stops of the load, or further than the wire is long."""
 
 
 class Loop(eqx.Module):
@@ -105,7 +106,7 @@ def simulate_loop_dataset(
     check_interface("", 0.0, period, dt)
     every = round(period / dt)
     wanted = _wanted(set_point, system.load.reading[1], seconds, dt)
-    _warn_beyond_stops(system.load, wanted)
+    _warn_beyond_stops(system, wanted)
     samples = (wanted.position.shape[0] - 1) // every * every + 1
     if samples <= every:
         raise ValueError(f"the run is shorter than one control period of {period:g} s.")
@@ -128,12 +129,18 @@ def simulate_loop_dataset(
     )
 
 
-def _warn_beyond_stops(load: AbstractMovingLoad, wanted: Reference) -> None:
+def _warn_beyond_stops(system: System, wanted: Reference) -> None:
+    load = system.load
+    assert isinstance(load, AbstractMovingLoad)
     (low, high), unit = map(float, load.limits()), load.reading[1]
+    stops = f"the load between its end stops from {low:.4g} to {high:.4g} {unit}"
+    if math.isinf(low) and math.isinf(high):  # no stops: no wire becomes shorter by its whole length
+        high = 1.0 / abs(float(load.contraction(system.wire)))
+        low, stops = -high, f"the load at most {high:.4g} {unit} if the wire became shorter by all of its length"
     if beyond := beyond_ends(wanted.position, (low, high), BEYOND):
         warnings.warn(
-            f"the set point goes from {beyond[0]:.4g} to {beyond[1]:.4g} {unit}, and the load between its end stops from {low:.4g} to {high:.4g} {unit}: "
-            f"a number is in {unit}; of another unit give text (`'60 deg'`).",
+            f"the set point goes from {beyond[0]:.4g} to {beyond[1]:.4g} {unit}, and {stops}: "
+            f"a number is in {unit}; of another unit give text (`'{'60 deg' if unit == 'rad' else '2 mm'}'`).",
             SetPointWarning,
             stacklevel=3,
         )

@@ -123,6 +123,8 @@ def _select(model: eqx.Module, names: Sequence[str]) -> list[Parameter]:
 def get_parameters(model: eqx.Module, names: Sequence[str]) -> Float[Array, " names"]:
     """The values of `names`, in that order, SI."""
     values = [value_at(model, entry.path) for entry in _select(model, names)]
+    if not values:
+        return jnp.zeros(0)
     if any(isinstance(one, jax.core.Tracer) for one in values):
         return jnp.stack([jnp.asarray(one, dtype=float) for one in values])
     # By numpy: of JAX each operation is a program of its own for each number of names, which takes longer to compile than all else here.

@@ -55,7 +55,9 @@ def test_a_swept_loop_runs_on_the_plant_that_its_row_says() -> None:
     row = rows[np.flatnonzero((heat == 2.0) & (strain == 0.5))[0]]
     values = dict(zip(found.columns, map(jnp.asarray, row), strict=False))
     true, believed = parameter_values(perturbed_plant(plant, values, found.perturbation)), parameter_values(plant)
-    assert {name: true[name] / believed[name] for name in ASKED} == pytest.approx(dict(zip(ASKED, (2.0, 0.5), strict=True)))
+    assert {name: true[name] / believed[name] for name in ASKED} == pytest.approx(
+        dict(zip(ASKED, (2.0, 0.5), strict=True))
+    )
     assert {name for name in true if true[name] != pytest.approx(believed[name])} == set(ASKED)
 
 
