@@ -98,3 +98,16 @@ def test_a_corrected_wire_that_was_kept_from_a_curve_goes_on_from_where_it_is(he
             assert on_curve(then, jnp.asarray(other)) == pytest.approx(xi, rel=1e-12)
     followed = Corrected().renewed(wire, jnp.asarray(heating), jnp.asarray(not heating), share, share, jnp.asarray(xi))
     assert missed(followed) == 0.0
+
+
+@pytest.mark.parametrize("heating", [True, False])
+def test_a_wire_that_transforms_the_other_way_forgets_the_curve_that_it_was_kept_from(heating: bool) -> None:
+    state = initial_state(COUPON, {"temperature": jnp.asarray(20.0), "stress": jnp.asarray(100e6)}).wire
+    share = jnp.asarray(0.4)
+    amplitudes = {"xi_M": 1.25, "heating_missed": 1.0} if heating else {"xi_A": -0.25, "cooling_missed": 1.0}
+    kept = _of_wire(state, martensite_fraction=0.5, **amplitudes)
+    there = jnp.asarray(0.6 if heating else 0.4)
+    after = Corrected().renewed(kept, jnp.asarray(not heating), jnp.asarray(heating), share, share, there)
+    assert float(after.heating_missed if heating else after.cooling_missed) == 0.0
+    reached = after.xi_M * share if heating else 1.0 - (1.0 - after.xi_A) * share
+    assert float(reached) == pytest.approx(float(there))
