@@ -15,6 +15,7 @@ from smajax.control.figures_of_merit import SetPointMerit
 from smajax.control.position_unit import unit_of
 from smajax.control.reach import reach_of, reach_sentence
 from smajax.control.run_notes import (
+    AboveAnnealing,
     AboveMelting,
     AboveStrength,
     CycleLeavesStrain,
@@ -24,7 +25,7 @@ from smajax.control.run_notes import (
     NotResolved,
 )
 from smajax.control.signal_path import check_set_points
-from smajax.data.experiment.magnitude import MELTS, STRENGTH
+from smajax.data.experiment.magnitude import ANNEALS, MELTS, STRENGTH
 from smajax.model.system import System
 from smajax.model.wire.constitutive import young_modulus
 from smajax.model.wire.form import RateForm
@@ -36,12 +37,14 @@ LEFT = 5e-4  # strain that a cycle leaves; less is not said
 
 
 def notes_of_run(data: xr.Dataset) -> list[Note]:
-    """Notes on values that are not finite, on a wire that would melt or tear, and on a run that its integration does not resolve."""
+    """Notes on values that are not finite, on a wire that would melt, anneal or tear, and on a run that its integration does not resolve."""
     wrong = tuple(str(name) for name in data.data_vars if not np.isfinite(data[name].to_numpy()).all())
     notes: list[Note] = [NotFinite(wrong)] if wrong else []
     hottest = float(data["temperature"].max())
     if hottest > MELTS:
         notes.append(AboveMelting(hottest))
+    elif hottest > ANNEALS:
+        notes.append(AboveAnnealing(hottest))
     largest = float(data["stress"].max())
     if largest > STRENGTH:
         notes.append(AboveStrength(largest))

@@ -15,6 +15,7 @@ from smajax.control.position_unit import SHARES, PositionUnit, band_shown, unit_
 from smajax.control.scales import HEADROOM, limited_as, seconds_for
 from smajax.core.display_units import digits
 from smajax.core.parameters import parameters
+from smajax.data.experiment.magnitude import ANNEALS
 from smajax.model.system import System
 from smajax.simulation.compiled import simulate_compiled
 
@@ -34,6 +35,7 @@ class Reach(NamedTuple):
     unit: PositionUnit
     by_drive: bool = True  # whether the largest command is the drive's; False: the controller's own
     parameters: tuple[str, ...] = ()  # of the controller, which limit its command
+    hottest: float = 0.0  # degC, of the wire with the largest command
 
     def words(self) -> str:
         """`with up to 5 V this load comes to rest between 0 and 12.3 mm`."""
@@ -54,17 +56,18 @@ def reach_of(system: System, controller: AbstractController | None = None) -> Re
     if not math.isfinite(largest) or load.inputs_required:
         return None
     samples = round(LONGER * seconds_for(system) / STEP) + 1
-    ends = []
+    ends, hottest = [], 0.0
     for command in (0.0, largest):
         inputs = system.drive.from_command(jnp.full(samples, command))
-        position = np.asarray(simulate_compiled(system, inputs, STEP, TOLERANCE).position)
+        run = simulate_compiled(system, inputs, STEP, TOLERANCE)
+        position, hottest = np.asarray(run.position), float(np.max(run.temperature))
         ends.append(position[-round(AT_REST * samples) :])
     if not np.isfinite(ends).all():
         return None
     unit = unit_of(system)
     limiting = () if controller is None else tuple(limits_of(controller))
     low, high = float(unit.of(np.min(ends))), float(unit.of(np.max(ends)))
-    return Reach(low, high, largest, unit, of_drive <= of_controller, limiting)
+    return Reach(low, high, largest, unit, of_drive <= of_controller, limiting, hottest)
 
 
 def shared_set_points(systems: Iterable[System], count: int) -> tuple[float, ...]:
@@ -103,7 +106,8 @@ def higher_limit(
 ) -> dict[str, float]:
     """A higher limit of a controller's command, with as much above what the set points need as presets have; by its parameters, in the drive's unit.
 
-    `reach_with`: the reach with values of these. Empty where the set points are in reach, or the drive's limit is lower or not known.
+    `reach_with`: the reach with values of these. Empty where the set points are in reach, the drive's limit is lower or not known, or the wire anneals
+    before it reaches them.
     """
     known = limited_as(system)
     too_high = any(one > reach.high for one in out_of_reach(reach, system, set_points))
@@ -113,6 +117,8 @@ def higher_limit(
     # From below: of a wire that is far too hot expansion takes the stroke away again.
     while limit < LARGER * of_drive:
         with_it = reach_with(dict.fromkeys(reach.parameters, min(limit, of_drive)))
+        if with_it is not None and with_it.hottest > max(ANNEALS, reach.hottest):
+            return {}
         if with_it is not None and not out_of_reach(with_it, system, set_points):
             return dict.fromkeys(reach.parameters, min(HEADROOM * limit, of_drive))
         limit *= LARGER

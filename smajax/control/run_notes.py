@@ -101,6 +101,13 @@ class AboveMelting:
 
 
 @dataclass(frozen=True)
+class AboveAnnealing:
+    """The wire gets hotter than it may without losing its training."""
+
+    hottest: float  # degC
+
+
+@dataclass(frozen=True)
 class AboveStrength:
     """The wire is under more stress than it carries."""
 
@@ -152,6 +159,7 @@ Note: TypeAlias = (
     InputLeftOut
     | NotFinite
     | AboveMelting
+    | AboveAnnealing
     | AboveStrength
     | NotResolved
     | CycleLeavesStrain

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from smajax.control.run_notes import (
     MOST_SET_POINTS,
+    AboveAnnealing,
     AboveMelting,
     AboveStrength,
     CycleLeavesStrain,
@@ -18,7 +19,7 @@ from smajax.control.run_notes import (
     TooManySetPoints,
 )
 from smajax.core.display_units import digits
-from smajax.data.experiment.magnitude import MELTS, STRENGTH
+from smajax.data.experiment.magnitude import ANNEALS, MELTS, STRENGTH
 from smajax.data.text_input import HELD
 
 
@@ -38,6 +39,11 @@ def _sentence(note: Note) -> str:
             return f"Values that are not finite in {', '.join(variables)}: is the heat or the step too large?"
         case AboveMelting(hottest):
             return f"The wire reaches {hottest:.4g} degC, and it melts at {MELTS:g} degC: is the input's unit right?"
+        case AboveAnnealing(hottest):
+            return (
+                f"The wire reaches {hottest:.4g} degC: a trained nickel-titanium wire is annealed from about {ANNEALS:g} degC on and loses stroke, which this model "
+                "does not. Of an alloy for high temperatures its maker tells the limit."
+            )
         case AboveStrength(largest):
             return (
                 f"The stress reaches {digits(largest / 1e6, 4)} MPa, and no wire carries more than {STRENGTH / 1e6:g} MPa: is the load's unit "

@@ -29,6 +29,7 @@ LARGEST: Mapping[str, tuple[float, str, str]] = MappingProxyType(
     }
 )
 MELTS = 1310.0  # degC, nickel-titanium
+ANNEALS = 300.0  # degC, of a drawn and trained nickel-titanium wire (Dynalloy, technical characteristics of Flexinol)
 # Pa: no wire carries more. Ultimate tensile strength of nickel-titanium in typical data sheets: about 1000 MPa (annealed) to 1900 MPa (cold drawn).
 STRENGTH = 1.9e9
 WARMS = 5.0  # K above the air: less transforms nothing
