@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ import pytest
 from smajax.control.mismatch import MISMATCHES, check_known, mismatches_of, of_a_ratio
 from smajax.control.perturbed_plant import perturbed_plant
 from smajax.control.plants import plant_set
-from smajax.control.sweep.run_sweep import sweep_settings_for
+from smajax.control.sweep.run_sweep import may_resume, sweep_controllers, sweep_settings_for
 from smajax.control.sweep.spread_plants import spread_plants
 from smajax.control.tune.scenarios import tuned_on
 from smajax.control.tune.settings import settings_for
@@ -78,3 +80,21 @@ def test_more_than_two_are_spread_plants() -> None:
     batch = plant_set(plant, several).batch
     assert batch is not None
     assert batch.shape == (8, 3)
+
+
+def test_the_seed_of_a_sweep_is_that_of_its_noise() -> None:
+    plant = PLANTS["bias_spring"]
+    settings = sweep_settings_for(plant, ["pid"], points=2, set_points=(1.0,), gain_ratios=(1.0,), seconds=1.0)
+    first, again, other = (
+        next(iter(sweep_controllers(plant, dataclasses.replace(settings, seed=seed)))).merits.steady_error
+        for seed in (0, 0, 1)
+    )
+    np.testing.assert_array_equal(first, again)
+    assert (np.asarray(first) != np.asarray(other)).all()
+
+
+def test_a_sweep_of_before_there_was_a_seed_goes_on() -> None:
+    record = sweep_settings_for(PLANTS["arm"], ["pid"]).record()
+    before = {name: value for name, value in record.items() if name != "seed"}
+    assert may_resume(before, record)
+    assert not may_resume(before, {**record, "seed": 1})

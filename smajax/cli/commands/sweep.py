@@ -41,7 +41,6 @@ if TYPE_CHECKING:
     from smajax.control.sweep.run_sweep import SweepSettings
     from smajax.model.system import System
 
-SEED = 0  # of plants drawn from a posterior
 AXES = 2  # mismatches that a map has place for
 SPREAD_FAST = 16  # plants of more mismatches, with --fast
 
@@ -71,6 +70,7 @@ class _Options:
     set_points: str | None
     gain_ratios: str | None
     fast: bool
+    seed: int
 
     def mismatches(self, plant: System) -> tuple[str, ...]:
         """The names of --over, none without the option. Raises typer.BadParameter."""
@@ -99,7 +99,7 @@ class _Options:
         """What the loops run on in the place of mismatches: of more than a map has axes plants that differ in all of them. Raises typer.BadParameter."""
         names = self.mismatches(assumed)
         if len(names) <= AXES or plant.plant is not None:  # which it refuses beside mismatches
-            return plant.plants(SEED, others=bool(names), limit=limit)
+            return plant.plants(self.seed, others=bool(names), limit=limit)
         from smajax.control.sweep.spread_plants import SPREAD, spread_plants
 
         count = (SPREAD_FAST if self.fast else SPREAD) if plant.drawn is None else plant.drawn
@@ -138,7 +138,7 @@ class _Options:
 
         request = self.controllers or ",".join(dict.fromkeys(one.controller for one in tuned)) or "all"
         named = [part.strip() for part in request.split(",")]
-        given: dict[str, Any] = {**set_points_of(plant, self.set_points, self.fast), **loop}
+        given: dict[str, Any] = {**set_points_of(plant, self.set_points, self.fast), "seed": self.seed, **loop}
         given["ratio_range"] = self.ratio_range()
         names = self.mismatches(plant)
         if 0 < len(names) <= AXES:
@@ -236,6 +236,9 @@ def sweep(
             help="folder for index.html, the pictures, sweep.json, sweep.nc (every loop) and a CSV a controller"
         ),
     ] = Path("sweep"),
+    seed: Annotated[
+        int, typer.Option(callback=within(0), help="of the noise, and of plants drawn from a posterior")
+    ] = 0,
     fast: Annotated[
         bool,
         typer.Option(
@@ -295,7 +298,7 @@ def sweep(
     counted = noise_option(quantum, unit_of(assumed), "--quantum")
     between |= {} if counted is None else {"quantum": counted}
     between |= {} if seconds is None else {"seconds": seconds}
-    options = _Options(controllers, over, points, ratios, set_points, gain_ratios, fast)
+    options = _Options(controllers, over, points, ratios, set_points, gain_ratios, fast, seed)
     plants = options.plants(assumed, plant, loop.command_limit)
     settings = options.settings(assumed, tuned, tolerance=tolerance_of(tolerance), **between)
     with refused():

@@ -69,6 +69,7 @@ class SweepSettings:
     tolerance: Tolerance = AUTO  # as `run_batch`'s; None is one step a sample
     unit: str = "deg"  # of set points and noise, as `position_unit.unit_of` the plant
     ratio_range: tuple[float, float] = (LEAST, MOST)  # of plant over the controller's model: below and above 1
+    seed: int = 0  # of the noise: each loop draws its own from it
 
     @property
     def grid(self) -> Grid:
@@ -234,6 +235,7 @@ def line_target(system: System, grid: Grid) -> float:
 
 def may_resume(before: Mapping[str, Any], now: Mapping[str, Any]) -> bool:
     """Whether a sweep recorded as `now` continues one recorded as `before`: the same, or with controllers added."""
+    before = {"seed": 0, **before}  # of a record of before there was one
     added = {"controllers", "tuned"}
     gains = [one for one in now["tuned"] if one["controller"] in before["controllers"]]
     return (
@@ -357,6 +359,7 @@ def _computed(
         settings.dt,
         interface_of(plant, *between, settings.delay, settings.quantum),
         perturbation=plants.perturbation,
+        seed=settings.seed,
     )
     # One batch, one program.
     whole = np.concatenate([grid.rows(), loop_rows({}, grid.targets, plants=plants)])
