@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.core.display_units import digits, display, label
+from smajax.core.display_units import display, label
 from smajax.core.plugins import EFFECTS, PluginError, points_of, whose
 from smajax.model.effects.base import AbstractEffect
 from smajax.model.effects.library import of_others
@@ -59,7 +59,7 @@ def shift(effect: type[AbstractEffect]) -> str:
             most = float(np.abs(after - before).max())
             if most > NOTHING * max(float(np.ptp(before)), 1e-3 * float(np.abs(before).max())):
                 seen = display(unit_of, called)
-                changes.append(f"the {label(called)} by up to {digits(seen.of(most), 3)} {seen.unit}".rstrip())
+                changes.append(f"the {label(called)} by up to {seen.with_unit(most, 3)}")
         return ", ".join(changes)
     return ""
 

@@ -24,6 +24,10 @@ class Display:
         """`value` (SI, degrees Celsius, radians; any shape) in the unit shown, which differs by a factor only."""
         return value * self.factor
 
+    def with_unit(self, value: float, count: int = 4) -> str:
+        """`12.3 mm` of 0.0123 m: `digits` of it and the unit, if there is one."""
+        return f"{digits(self.of(value), count)} {self.unit}".rstrip()
+
 
 _SHOWN = {
     "m": Display("mm", 1e3),

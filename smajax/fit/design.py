@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.core.display_units import digits, label
+from smajax.core.display_units import label
 from smajax.data.experiment.record import Run
 from smajax.fit.packed_runs import RunBatch
 from smajax.fit.problem import Problem
@@ -52,7 +52,7 @@ def _levels(runs: Sequence[Run], name: str) -> list[float]:
 def _with_unit(name: str, value: float) -> str:
     """The value of an input (SI) in its display unit: `93 °C`."""
     display = channel(name)
-    return f"{digits(display.of(value))} {display.unit}".strip()
+    return display.with_unit(value)
 
 
 def candidate_runs(runs: Sequence[Run]) -> dict[str, dict[str, np.ndarray]]:

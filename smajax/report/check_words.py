@@ -59,11 +59,11 @@ def _errors(found: ExperimentCheck) -> Iterator[str]:
             rmse = found.rmse(k, role)
             if np.isfinite(rmse):
                 ratio = f", {times_noise(rmse / one.noise)}" if one.noise > 0.0 else ""
-                sizes.append(f"of the {role} runs is off by {digits(shown.of(rmse), 3)} {shown.unit} (rms){ratio}")
+                sizes.append(f"of the {role} runs is off by {shown.with_unit(rmse, 3)} (rms){ratio}")
         if sizes:
             zero = " Each run's own zero is taken off." if one.offset is not None else ""
             yield (
-                f"At the initial guess the {label(one.output)} {'; that '.join(sizes)}. The noise is {digits(shown.of(one.noise), 3)} {shown.unit}: "
+                f"At the initial guess the {label(one.output)} {'; that '.join(sizes)}. The noise is {shown.with_unit(one.noise, 3)}: "
                 f"{found.noises[one.output]}.{zero}"
             )
 

@@ -223,8 +223,7 @@ def _contradicted(one: Estimate) -> str:
         return ""
     unit = display(one.unit, one.name)
     return (
-        f"{one.name} ends at {digits(unit.of(one.value), 3)} {unit.unit}".rstrip()
-        + f", {abs(off):.1f} standard deviations "
+        f"{one.name} ends at {unit.with_unit(one.value, 3)}" + f", {abs(off):.1f} standard deviations "
         f"{'above' if off > 0.0 else 'below'} what was known before ({prior_shown(one)}): the runs speak against that prior. "
         "Either it is wrong, or the model or the runs are; without the prior the estimate would lie further off still."
     )
@@ -245,15 +244,12 @@ def _error(result: Identified, output: int) -> str:
     """Error of one output and its noise, in its own unit."""
     one = result.outputs[output]
     unit = display(one.unit, one.name)
-    errors = "; ".join(
-        f"{role} runs {digits(unit.of(error), 3)} {unit.unit}".strip()
-        for role, error in rms_by_role(result, output).items()
-    )
+    errors = "; ".join(f"{role} runs {unit.with_unit(error, 3)}" for role, error in rms_by_role(result, output).items())
     whose = f"Error of the {label(one.name)} (rms)" if len(result.outputs) > 1 else "Error (rms)"
-    sigma = f"{digits(unit.of(one.noise_sigma), 3)} {unit.unit}".strip()
+    sigma = unit.with_unit(one.noise_sigma, 3)
     if one.noise_before is None:
         return f"{whose}: {errors}; noise {sigma}, {one.noise_how}."
-    own = f"{digits(unit.of(one.noise_before), 3)} {unit.unit}".strip()
+    own = unit.with_unit(one.noise_before, 3)
     return f"{whose}: {errors}; noise {own} by differences of neighbouring samples; the fit weighs a sample by {sigma}, which is what the model leaves."
 
 

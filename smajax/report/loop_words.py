@@ -73,8 +73,8 @@ def loop_words(loop: LoopSettings, largest: float | None = None) -> str:
 def noise_words(loop: LoopSettings) -> str:
     """`0.1 mm of noise, in steps of 0.02 mm`, or `no noise`."""
     shown = display(loop.position_unit)
-    said = f"{digits(shown.of(loop.noise), 3)} {shown.unit} of noise" if loop.noise else "no noise"
-    return said + (f", in steps of {digits(shown.of(loop.quantum), 3)} {shown.unit}" if loop.quantum else "")
+    said = f"{shown.with_unit(loop.noise, 3)} of noise" if loop.noise else "no noise"
+    return said + (f", in steps of {shown.with_unit(loop.quantum, 3)}" if loop.quantum else "")
 
 
 def source_sentences(sources: Iterable[Source]) -> tuple[str, ...]:
@@ -92,7 +92,7 @@ def source_sentence(source: Source | None) -> str:
             )
         case NoiseOfModelFile(noise, reading, unit, of_sample):
             shown = display(unit, reading)
-            said, sample = (f"{digits(shown.of(one or 0.0), 3)} {shown.unit}" for one in (noise, of_sample))
+            said, sample = (shown.with_unit(one or 0.0, 3) for one in (noise, of_sample))
             single = f" of a single reading (a sample of its fit has {sample})" if of_sample else ""
             return f"The sensor has the noise of the model file, {said} (1 sigma){single}; --noise gives another one, --noise 0 none."
         case PresetGains(controller, scaled):

@@ -37,8 +37,8 @@ def conclusions(result: Prediction) -> list[str]:
         unit = display(one.unit, one.output)
         if not np.isfinite(errors.rmse):
             continue
-        size = f"{digits(unit.of(errors.rmse), 3)} {unit.unit}".strip()
-        noise = f"{digits(unit.of(one.noise), 3)} {unit.unit}".strip()
+        size = unit.with_unit(errors.rmse, 3)
+        noise = unit.with_unit(one.noise, 3)
         count = len(result.measured_runs(k))
         sentences.append(
             f"The {label(one.output)} of {count} run{'s' if count > 1 else ''} is predicted with an error (rms) of {size}, "
@@ -64,7 +64,7 @@ def zero_sentences(result: Prediction, output: int) -> list[str]:
     worst = max(large, key=lambda run: _zero_ratio(run, output))
     one = worst.series[output]
     unit = display(one.unit, one.output)
-    size = f"{digits(unit.of(one.offset), 3)} {unit.unit}".strip()
+    size = unit.with_unit(one.offset, 3)
     count = "" if len(large) == 1 else f"{len(large)} of them are large, "
     return [
         f"The zero of the {label(one.output)} is fitted to each run: {count}{worst.name} has {size}, "

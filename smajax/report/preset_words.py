@@ -43,7 +43,7 @@ def sentence(ranking: PresetRanking, begun: bool = False) -> str:
     worth = [one for one in ranking.influences if one.noises >= WORTH]
     which = "as the start in place of the preset's" if begun else "in place of the start"
     where = "".join(
-        f" (with {name} = {digits(shown.of(value), 3)} {shown.unit} {which}, at which the wire transforms too little)"
+        f" (with {name} = {shown.with_unit(value, 3)} {which}, at which the wire transforms too little)"
         for name, (value, unit) in ranking.changed.items()
         for shown in [display(unit, name)]
     )

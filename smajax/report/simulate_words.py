@@ -189,7 +189,7 @@ def run_sentences(result: RunResult) -> list[str]:
 
     def at(name: str, value: float) -> str:
         unit = display(data[name].attrs["units"], name)
-        return f"{digits(unit.of(float(value)), 3)} {unit.unit}".strip()
+        return unit.with_unit(float(value), 3)
 
     degrees, reading = data["temperature"].to_numpy(), reading_of(data)
     hottest = int(degrees.argmax())
@@ -244,7 +244,7 @@ def _each_set_point(result: RunResult) -> tuple[list[str], int]:
     of = display(result.system.load.reading[1])
     after = [float(one.merit.settling_time) for one in result.by_set_point]
     each = [
-        f"{digits(of.of(one.set_point))} {of.unit} "
+        f"{of.with_unit(one.set_point)} "
         + (f"after {digits(late, 3)} s" if np.isfinite(late) else _late(one.end - one.begin))
         for one, late in zip(result.by_set_point, after, strict=True)
     ]
@@ -269,7 +269,7 @@ def _answer(result: RunResult) -> str:
     name = data.attrs.get("controller", "")
     if result.merit:
         of = display(result.system.load.reading[1])
-        at = f"{digits(of.of(float(data['wanted'][-1])))} {of.unit}"
+        at = of.with_unit(float(data["wanted"][-1]))
         errors = _errors(result, [result.merit])
         settles = result.merit["settling_time"]
         seconds = digits(float(data["time"][-1]), 3)
@@ -300,7 +300,7 @@ def _errors(result: RunResult, figures: Sequence[Mapping[str, float]]) -> str:
     shown = []
     for name in ("overshoot", "steady_error"):
         value = max(one[name] for one in figures)
-        shown.append(f"{digits(of.of(0.0 if value < least else value), 2)} {of.unit}")
+        shown.append(of.with_unit(0.0 if value < least else value, 2))
     most = "at most " if len(figures) > 1 else ""
     return f"an overshoot of {most}{shown[0]} and a steady error of {most}{shown[1]}"
 

@@ -13,7 +13,7 @@ from smajax.app.project import EXPERIMENT, Project
 from smajax.app.ready import ready
 from smajax.app.step import FieldError, Sent, Step
 from smajax.app.watched import Watched, watched
-from smajax.core.display_units import digits, display
+from smajax.core.display_units import display
 
 COMMANDS = ("close-loop", "identify")
 DEFAULTS = {"close-loop": "report", "identify": "identified"}
@@ -96,9 +96,7 @@ def _errors(job: jobs.Job, seen: Watched) -> list[dict[str, str]]:
     result = []
     for series, value in zip(job.about.get("series", ()), seen.errors[-1][1], strict=False):
         unit = display(series["unit"], series["output"])
-        result.append(
-            {"run": series["run"], "output": series["output"], "error": f"{digits(unit.of(value), 3)} {unit.unit}"}
-        )
+        result.append({"run": series["run"], "output": series["output"], "error": unit.with_unit(value, 3)})
     return result
 
 
@@ -106,7 +104,7 @@ def _parameters(seen: Watched) -> list[tuple[str, str]]:
     found = []
     for name, value in (seen.parameters or {}).items():
         unit = display((seen.units or {}).get(name, ""), name)
-        found.append((name, f"{digits(unit.of(value), 4)} {unit.unit}"))
+        found.append((name, unit.with_unit(value, 4)))
     return found
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from smajax.core.display_units import digits, display
+from smajax.core.display_units import display
 from smajax.core.wording import per_cent
 from smajax.data.experiment.record import Output, Run
 from smajax.data.readers.table import Array
@@ -37,7 +37,7 @@ def motion_warnings(runs: Sequence[Run], outputs: Sequence[Output]) -> list[str]
             if not change or not (noisy or few):
                 continue
             beside = f"{change / output.noise_sigma:.1f} times its noise" if noisy else f"{per_cent(change / most)} of"
-            what = f"{digits(unit.of(change), 3)} {unit.unit}".strip() + f", {beside}"
+            what = unit.with_unit(change, 3) + f", {beside}"
             if run.role == "fit":
                 result.append(
                     f"run {run.name!r}: the output {output.name!r} changes by {what}, so the fit learns little from it: was the drive on, "

@@ -80,7 +80,7 @@ def _left_out(model: ModelRecord, experiment: Experiment) -> list[str]:
         if not parameter or given & {name, parameter} or not low < high:
             continue
         unit = display(range_unit(name, model.table), name)
-        ends = f"{digits(unit.of(low), 4)} to {digits(unit.of(high), 4)} {unit.unit}".strip()
+        ends = f"{digits(unit.of(low), 4)} to {unit.with_unit(high, 4)}"
         where = (
             f"--input {name}=..., or in [[runs]] inputs"
             if name in replaced
@@ -88,8 +88,7 @@ def _left_out(model: ModelRecord, experiment: Experiment) -> list[str]:
         )
         notes.append(
             f"{name} was {ends} in the runs that the model was fitted to, and these runs do not say theirs: "
-            f"{digits(unit.of(model.values[parameter]), 4)} {unit.unit}".rstrip()
-            + f" is taken; give it with {where}"
+            f"{unit.with_unit(model.values[parameter], 4)} is taken; give it with {where}"
         )
     sampling = None if model.log_format is None else model.log_format.sampling
     if sampling is not None:

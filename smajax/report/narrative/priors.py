@@ -35,7 +35,7 @@ def _as_the_library(one: PriorFinding) -> bool:
 
 def _spread(base: float, width: float, logarithmic: bool, unit: str, name: str) -> str:
     seen = display(unit, name)
-    middle = f"{digits(seen.of(base), 3)} {seen.unit}".strip()
+    middle = seen.with_unit(base, 3)
     if logarithmic:
         return f"{middle}, times or over {math.exp(width):.3g},"
     its = "K" if unit == "degC" else seen.unit  # of a difference

@@ -24,7 +24,7 @@ def error_text(findings: Findings, value: float) -> str:
 def assumed_text(parameter: AssumedParameter) -> str:
     """`wire_length 0.9 m`."""
     seen = display(parameter.unit, parameter.name)
-    return f"{parameter.name} {digits(seen.of(parameter.value))} {seen.unit}".strip()
+    return f"{parameter.name} {seen.with_unit(parameter.value)}"
 
 
 def far_text(findings: Findings, parameter: ParameterFinding) -> str:
@@ -40,7 +40,7 @@ def as_written(parameter: ParameterFinding, value: float) -> str:
     """A value of it as an engineer writes it: `75 GPa`."""
     shown = display(parameter.unit, parameter.name)
     seen = written(parameter.unit, value) if shown.unit == "MPa" else shown
-    return f"{digits(seen.of(value))} {seen.unit}".strip()
+    return seen.with_unit(value)
 
 
 def log_odds_text(value: float) -> str:
