@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.control.controller_call import check_is_controller, commanded
+from smajax.control.controller_call import begun, check_is_controller, commanded
 from smajax.control.controllers.base import AbstractController
 from smajax.control.estimators.base import AbstractEstimator
 from smajax.control.measured_state import MeasuredState, Sensor, truth
@@ -74,6 +74,14 @@ class ClosedLoopSetup(eqx.Module):
     disturbance: Mapping[str, Series] | None = None
     initial: State | None = None
     integration: Integration = ONE_STEP  # how finely between two samples
+    assumed: System | None = (
+        None  # the plant as the controller knows it, by whose drive a command becomes an input; None: as it is
+    )
+
+    @property
+    def known(self) -> System:
+        """The plant as the controller knows it."""
+        return self.system if self.assumed is None else self.assumed
 
     @property
     def samples(self) -> int:
@@ -94,7 +102,7 @@ class ClosedLoopSetup(eqx.Module):
         """The first state: `initial`, or rest with the first disturbances and 0 V."""
         if self.initial is not None:
             return self.initial
-        inputs = self.system.drive.from_command(jnp.zeros(()))
+        inputs = self.known.drive.from_command(jnp.zeros(()))
         return initial_state(self.system, {**inputs, **{name: one[0] for name, one in self.disturbances.items()}})
 
     def check(self) -> None:
@@ -200,6 +208,7 @@ def simulate_closed_loop(  # the public form: what goes inwards is a `ClosedLoop
     disturbance: Mapping[str, Series] | None = None,
     initial: State | None = None,
     integration: Integration = ONE_STEP,
+    assumed: System | None = None,
 ) -> ClosedLoop:
     """Simulate over the samples of `wanted` (rad or m), `dt` seconds apart; the controller is called `every` samples.
 
@@ -209,14 +218,15 @@ def simulate_closed_loop(  # the public form: what goes inwards is a `ClosedLoop
     later. Without an `estimator` it measures the true state, with the position as `sensor` (with noise drawn from `key`)
     reads it. `disturbance` are further inputs of the system, such as `load_torque`, `added_mass` or `ambient_temperature`, each of
     shape (n,). A plain array for `wanted` means set points (`reference.resting`). `initial` defaults to rest.
-    `integration`: how finely between two samples; error-controlled steps have derivatives in forward mode alone.
+    `integration`: how finely between two samples; error-controlled steps have derivatives in forward mode alone. `assumed`: the plant as
+    the controller knows it, by whose drive a command becomes an input (a duty goes by the supply that is believed to be there); default the plant itself.
 
     Raises ValueError when a gain, a parameter or the sensor's noise lies outside its bounds, when `dt` is not positive or a set point
     not finite (where values are known: outside of `jit`), when `wanted` is not a whole number of control periods and one sample more, and when noise has no `key`; TypeError for what is no controller, and
     one whose `step` JAX cannot trace (`controller_call.commanded`).
     """
     between = (estimator, sensor, key, delay, disturbance)
-    return stored_loop(ClosedLoopSetup(system, controller, wanted, dt, every, *between, initial, integration))
+    return stored_loop(ClosedLoopSetup(system, controller, wanted, dt, every, *between, initial, integration, assumed))
 
 
 def stored_loop(setup: ClosedLoopSetup) -> ClosedLoop:
@@ -278,14 +288,14 @@ def _control(setup: ClosedLoopSetup, start: State) -> Control:
         failed_at = jnp.minimum(memory.failed_at, jnp.where(jnp.isfinite(answer), jnp.inf, state.time))
         queue = jnp.append(memory.queue, jnp.where(jnp.isfinite(failed_at), 0.0, answer))
         held, queue = queue[0], queue[1:]
-        command = Command(held, setup.dt, setup.system.drive.from_command(held))
+        command = Command(held, setup.dt, setup.known.drive.from_command(held))
         return ControlMemory(estimate, own, held, queue, failed_at), command, (held, measured, reading)
 
     reading = reading_of(start, noise[0])
     estimate, measured = (None, with_reading(start, reading)) if estimator is None else estimator.start(reading)
     memory = ControlMemory(
         estimate,
-        controller.start(measured, jax.tree.map(lambda series: series[0], setup.wanted)),
+        begun(controller, measured, jax.tree.map(lambda series: series[0], setup.wanted)),
         jnp.zeros(()),
         jnp.zeros(setup.delay),
         jnp.where(inside_bounds(controller), jnp.inf, start.time),

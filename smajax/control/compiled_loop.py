@@ -25,7 +25,7 @@ from smajax.simulation.steppers import Integration
 
 def _run(setup: ClosedLoopSetup, _: dict[str, Scalar]) -> tuple[ClosedLoop, Merit]:
     loop = stored_loop(setup)
-    return loop, merit(loop, setup.system)
+    return loop, merit(loop, setup.system, assumed=setup.assumed)
 
 
 def evaluated_loop_compiled(setup: ClosedLoopSetup, engine: Engine = "auto") -> tuple[ClosedLoop, Merit]:

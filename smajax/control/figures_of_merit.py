@@ -12,6 +12,7 @@ import numpy as np
 
 from smajax.control.closed_loop import AbstractLoopObserver, ClosedLoop, ClosedLoopSetup, observe_closed_loop
 from smajax.control.reference import Reference
+from smajax.model.drive.base import AbstractDrive
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System, heating_power
 from smajax.model.types import Scalar, Series, State, Trajectory
@@ -120,6 +121,7 @@ class MeritObserver(AbstractLoopObserver):
     """Figures of merit while a loop runs, against its last set point."""
 
     system: System  # the plant that runs
+    drive: AbstractDrive  # by which a command became an input
     target: Scalar  # rad or m
     band: Scalar  # rad or m
     samples: int = eqx.field(static=True)
@@ -164,7 +166,7 @@ class MeritObserver(AbstractLoopObserver):
         system = self.system
         ohms = resistance_per_metre(system.wire, system.terms.resistance, now.temperature, now.fraction)
         turned = rising * (extreme - now.command) > switch_threshold(system, ohms)
-        power = heating_power(system, ohms, system.drive.from_command(now.command))
+        power = heating_power(system, ohms, self.drive.from_command(now.command))
         return MeritMemory(
             number=memory.number + 1,
             began=memory.began,
@@ -207,18 +209,22 @@ class MeritObserver(AbstractLoopObserver):
         )
 
 
-def merit_observer(system: System, wanted: Reference, band: Scalar | float | None = None) -> MeritObserver:
+def merit_observer(
+    system: System, wanted: Reference, band: Scalar | float | None = None, assumed: System | None = None
+) -> MeritObserver:
     """The observer of a run of the plant `system` against the last set point of `wanted`.
 
-    `band`, rad or m, is how near counts as there; default `band_of` the system.
+    `assumed`: the plant as the controller knew it (`ClosedLoopSetup`), default the plant. `band`, rad or m, is how near counts as
+    there; default `band_of` what is assumed, so that it is the same for all plants of a sweep.
     """
-    held = band_of(system) if band is None else jnp.asarray(band, dtype=float)
-    return MeritObserver(system, wanted.position[-1], held, jnp.shape(wanted.position)[0])
+    known = system if assumed is None else assumed
+    held = band_of(known) if band is None else jnp.asarray(band, dtype=float)
+    return MeritObserver(system, known.drive, wanted.position[-1], held, jnp.shape(wanted.position)[0])
 
 
-def merit(loop: ClosedLoop, system: System, band: Scalar | float | None = None) -> Merit:
-    """Figures of merit of a run that was simulated; `system` is the plant that ran. Pure: `vmap` it with the loop."""
-    return _replayed(merit_observer(system, loop.wanted, band), loop.run, loop.voltage)
+def merit(loop: ClosedLoop, system: System, band: Scalar | float | None = None, assumed: System | None = None) -> Merit:
+    """Figures of merit of a run that was simulated; `system` is the plant that ran, the rest as `merit_observer`'s. Pure: `vmap` it with the loop."""
+    return _replayed(merit_observer(system, loop.wanted, band, assumed), loop.run, loop.voltage)
 
 
 class _Replay(AbstractObserver):
@@ -261,19 +267,20 @@ def set_point_spans(set_points: np.ndarray) -> list[tuple[int, int]]:
 
 
 def merit_by_set_point(
-    loop: ClosedLoop, system: System, band: Scalar | float | None = None
+    loop: ClosedLoop, system: System, band: Scalar | float | None = None, assumed: System | None = None
 ) -> tuple[SetPointMerit, ...]:
     """`merit` of each set point by itself, as if the run began where it is set and ended where the next is.
 
     For runs that have been computed: how many there are is in the values.
     """
-    held, replayed = band_of(system) if band is None else jnp.asarray(band, dtype=float), eqx.filter_jit(_replayed)
+    known, replayed = system if assumed is None else assumed, eqx.filter_jit(_replayed)
+    held = band_of(known) if band is None else jnp.asarray(band, dtype=float)
     time, wanted = np.asarray(loop.run.time), np.asarray(loop.wanted.position)
     result = []
     for first, last in set_point_spans(wanted):
         run = jax.tree.map(lambda series, part=slice(first, last + 1): series[part], loop.run)
         voltage = jnp.asarray(loop.voltage)[first : last + 1].at[-1].set(loop.voltage[last - 1])
-        observer = MeritObserver(system, jnp.asarray(wanted[first]), held, last - first + 1)
+        observer = MeritObserver(system, known.drive, jnp.asarray(wanted[first]), held, last - first + 1)
         one = jax.tree.map(np.asarray, replayed(observer, run, voltage))
         result.append(SetPointMerit(float(time[first]), float(time[last]), float(wanted[first]), one))
     return tuple(result)
@@ -281,4 +288,4 @@ def merit_by_set_point(
 
 def evaluated_loop(setup: ClosedLoopSetup) -> tuple[Merit, Scalar]:
     """(figures of merit, `failed_at`) of a loop, of which nothing else is stored."""
-    return observe_closed_loop(merit_observer(setup.system, setup.wanted), setup)
+    return observe_closed_loop(merit_observer(setup.system, setup.wanted, assumed=setup.assumed), setup)

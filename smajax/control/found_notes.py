@@ -97,5 +97,5 @@ def notes_of_reach(
         return []
     plant = setup.system
     shown = [float(f"{one:.6g}") for one in unit_of(plant).of(missed)]
-    sentence = reach_sentence(reach_of(plant, setup.controller), plant, [*dict.fromkeys(shown)])
+    sentence = reach_sentence(reach_of(plant, setup.controller, setup.assumed), plant, [*dict.fromkeys(shown)])
     return [sentence] if sentence else []

@@ -12,7 +12,6 @@ from smajax.control.gains_file import Gains, read_gains
 from smajax.control.load_equation import moving_load
 from smajax.control.loop_dataset import Loop
 from smajax.control.measured_state import Sensor
-from smajax.control.perturbed_plant import commanded_as
 from smajax.control.presets import CONTROLLERS, check_controller, filter_of
 from smajax.core.names import close_matches
 from smajax.core.units import UnitError, parse_quantity
@@ -44,7 +43,6 @@ def loop_around(
     controller needs: which controller, which load, what is missing, which controllers can.
     """
     believed = system if assumed is None else assumed
-    system = commanded_as(system, believed)
     own = moving_load(system).reading[1]
     sigma, steps = (parse_quantity(one, own, bare=own) for one in (noise, quantum))
     sensor = Sensor(noise_sigma=sigma, quantum=steps) if sigma or steps else None
@@ -52,7 +50,7 @@ def loop_around(
     if isinstance(controller, AbstractController):
         if gains is not None:
             raise ValueError("gains go with the name of a controller: a controller of one's own has its gains already.")
-        return Loop(system, controller, filtered, sensor, delay)
+        return Loop(system, controller, filtered, sensor, delay, assumed)
     if not isinstance(controller, str):
         check_is_controller(controller)
     if controller not in CONTROLLERS:
@@ -60,7 +58,8 @@ def loop_around(
     check_controller(controller, believed)
     preset = CONTROLLERS[controller]
     known = preset.plant(believed)
-    return Loop(preset.plant(system), _gains(controller, gains, known).put(known), filtered, sensor, delay)
+    its = None if assumed is None else known
+    return Loop(preset.plant(system), _gains(controller, gains, known).put(known), filtered, sensor, delay, its)
 
 
 def _gains(controller: str, gains: Mapping[str, float | str] | Gains | Path | str | None, system: System) -> Gains:

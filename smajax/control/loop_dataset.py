@@ -48,6 +48,9 @@ class Loop(eqx.Module):
     estimator: AbstractEstimator | None = None  # None: the controller is told the true state
     sensor: Sensor | None = None  # None: the reading has no noise
     delay: int = eqx.field(static=True, default=0)  # control periods until a command arrives
+    assumed: System | None = (
+        None  # the plant as the controller knows it, by whose drive a command becomes an input; None: as it is
+    )
 
 
 def labelled_loop(
@@ -116,7 +119,9 @@ def simulate_loop_dataset(
     key = None if loop.sensor is None else jax.random.key(seed)
     inputs = {name: jnp.asarray(values, dtype=float) for name, values in (disturbance or {}).items()}
     between = (loop.estimator, loop.sensor, key, loop.delay, inputs)
-    run, _, error = measured_loop(ClosedLoopSetup(system, controller, wanted, dt, every, *between), tolerance)
+    run, _, error = measured_loop(
+        ClosedLoopSetup(system, controller, wanted, dt, every, *between, assumed=loop.assumed), tolerance
+    )
     check_answers(run)
     return labelled_loop(
         system,

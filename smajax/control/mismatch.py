@@ -9,9 +9,10 @@ import re
 from collections.abc import Mapping, Sequence
 
 from smajax.core.names import close_matches
-from smajax.core.parameters import parameter_values, parameters
+from smajax.core.parameters import check_bounds, parameter_values, parameters, set_parameters
 from smajax.core.units import UnitError, parse_quantity
 from smajax.model.load.arm import Arm
+from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System
 
 # What is looked at by sweeps and tuning: its name on the command line -> the plant's parameter.
@@ -25,7 +26,7 @@ MISMATCHES = {
 }
 # The same of other loads and drives, and of a user's own: what their parameters are called.
 _OTHER = {"inertia": ("slider_mass",), "payload": ("load_mass",), "supply": ("supply_voltage",)}
-_NO_MISMATCH = ("start_fraction", "start_temperature")
+_OF_START = ("start_fraction", "start_temperature", "start_angle")
 MINUS, BOTH = "\N{MINUS SIGN}", "\N{PLUS-MINUS SIGN}"
 _SIZE = r"\s*(\d+\.?\d*|\.\d+)\s*%\s*"
 _ONE_WAY = re.compile(rf"\s*([-+{MINUS}]){_SIZE}")
@@ -39,12 +40,12 @@ def mismatches_of(system: System, asked: Sequence[str] = ()) -> dict[str, str]:
     asked: names of other parameters, of which those that a ratio changes (`of_a_ratio`) are added.
     """
     there = parameters(system)
-    result: dict[str, str] = dict(MISMATCHES) if isinstance(system.load, Arm) else {}
-    if not result:
-        for short, own in MISMATCHES.items():
-            found = next((name for name in (own, *_OTHER.get(short, ())) if name in there), "")
-            if found:
-                result[short] = found
+    result: dict[str, str] = {}
+    for short, own in MISMATCHES.items():
+        found = next((name for name in (own, *_OTHER.get(short, ())) if name in there), "")
+        if found:
+            result[short] = found
+    if not isinstance(system.load, Arm):
         result |= {name: name for name in parameters(system.load) if name not in result.values()}
     more = of_a_ratio(system) if asked else ()
     return result | {name: name for name in asked if name in more and name not in {*result, *result.values()}}
@@ -56,13 +57,14 @@ def of_a_ratio(system: System) -> tuple[str, ...]:
     return tuple(
         name
         for name, value in parameter_values(system).items()
-        if value != 0.0 and table[name].unit != "degC" and name not in _NO_MISMATCH
+        if value != 0.0 and table[name].unit != "degC" and name not in _OF_START
     )
 
 
-def check_known(names: Sequence[str], system: System) -> None:
-    """Raise ValueError for a name that is neither of `mismatches_of` nor of `of_a_ratio`."""
-    known = {*mismatches_of(system), *of_a_ratio(system)}
+def check_known(names: Sequence[str], system: System, what: str = "mismatch") -> None:
+    """Raise ValueError for a name that is neither of `mismatches_of` nor of `of_a_ratio`; `what` the names are of."""
+    own = mismatches_of(system)
+    known = [*own, *(name for name in of_a_ratio(system) if name not in own.values())]
     for name in names:
         if name in known:
             continue
@@ -72,7 +74,31 @@ def check_known(names: Sequence[str], system: System) -> None:
                 f"`{name}` is {'0' if zero else 'a temperature, or of the start'}: a ratio of it changes nothing, or tells nothing. Give values in a batch "
                 "of plants: `plants=` in Python."
             )
-        raise ValueError(f"no mismatch `{name}`{close_matches(name, sorted(known), 'there are')}.")
+        raise ValueError(f"no {what} `{name}`{close_matches(name, known, 'there are')}.")
+
+
+def check_ratios_of(system: System, ratios: Mapping[str, tuple[float, float]], table: Mapping[str, str]) -> None:
+    """Raise ValueError where a plant at the least or the largest ratio of a mismatch has a value out of its bounds, or a start beyond the stops.
+
+    ratios: by mismatch; table: mismatch -> parameter.
+    """
+    for mismatch, ends in ratios.items():
+        name = table[mismatch]
+        value = parameter_values(system)[name]
+        for ratio in ends:
+            plant = set_parameters(system, {name: ratio * value})
+            try:
+                check_bounds(plant)
+            except ValueError as error:
+                raise ValueError(f"{ratio:g} times {name}: {error}") from None
+            load = plant.load
+            if isinstance(load, AbstractMovingLoad):
+                low, high = map(float, load.limits())
+                if not low <= float(load.start()) <= high:
+                    raise ValueError(
+                        f"{ratio:g} times {name}: the load starts at {float(load.start()):.4g}, and its end stops are at {low:.4g} and {high:.4g} "
+                        f"{load.reading[1]}. Give a smaller range."
+                    )
 
 
 def default_mismatches(system: System) -> tuple[str, str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -31,10 +30,4 @@ def perturbed_plant(system: System, values: Mapping[str, Scalar], perturbation: 
     if not names:
         return system
     column = jnp.stack([values[name] for name in perturbation.columns])
-    plant = set_vector(system, names, column if perturbation.absolute else get_parameters(system, names) * column)
-    return commanded_as(plant, system)
-
-
-def commanded_as(plant: System, assumed: System) -> System:
-    """`plant`, whose commands are those of a controller that knows the drive of `assumed`: a supply that is lower heats less."""
-    return dataclasses.replace(plant, drive=plant.drive.commanded_as(assumed.drive))
+    return set_vector(system, names, column if perturbation.absolute else get_parameters(system, names) * column)

@@ -43,14 +43,17 @@ class Reach(NamedTuple):
         return f"with up to {digits(self.command, 4)} {self.unit.command} this load comes to rest between {ends[0]} and {ends[1]} {self.unit.shown}"
 
 
-def reach_of(system: System, controller: AbstractController | None = None) -> Reach | None:
+def reach_of(
+    system: System, controller: AbstractController | None = None, assumed: System | None = None
+) -> Reach | None:
     """The reach of a plant, by a run without a command and one with the largest, from the start, cold and at rest.
 
     The largest command is that of the drive, or of the controller where it stays below. None where the reach cannot be known: neither has a
-    limit, or the load follows an input.
+    limit, or the load follows an input. assumed: the plant as the controller knows it, by whose drive a command becomes an input.
     """
     load = moving_load(system)
-    of_drive = float(system.drive.largest_command())
+    drive = (system if assumed is None else assumed).drive
+    of_drive = float(drive.largest_command())
     of_controller = math.inf if controller is None else float(controller.largest_command())
     largest = min(of_drive, of_controller)
     if not math.isfinite(largest) or load.inputs_required:
@@ -58,7 +61,7 @@ def reach_of(system: System, controller: AbstractController | None = None) -> Re
     samples = round(LONGER * seconds_for(system) / STEP) + 1
     ends, hottest = [], 0.0
     for command in (0.0, largest):
-        inputs = system.drive.from_command(jnp.full(samples, command))
+        inputs = drive.from_command(jnp.full(samples, command))
         run = simulate_compiled(system, inputs, STEP, TOLERANCE)
         position, hottest = np.asarray(run.position), float(np.max(run.temperature))
         ends.append(position[-round(AT_REST * samples) :])

@@ -36,7 +36,6 @@ from smajax.control.model_as_plant import (
     true_plant,
     with_limit,
 )
-from smajax.control.perturbed_plant import commanded_as
 from smajax.control.position_unit import PositionUnit, unit_of
 from smajax.control.presets import CONTROLLERS, check_controller
 from smajax.control.reference import Reference
@@ -329,7 +328,6 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
             if loop.plant is None
             else true_plant(loop.plant, loop.mismatch, assumed, gains.controller)
         )
-    plant = commanded_as(plant, assumed)
     unit = unit_of(assumed)
     sigma, quantum = (float(unit.of(one)) for one in sensor)
     between = own.estimator, sigma, own.period
@@ -348,6 +346,7 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
         sensor=interface.sensor,
         key=None if interface.sensor is None else jax.random.key(loop.seed),
         delay=interface.delay,
+        assumed=assumed,
     )
     run, merits, error = measured_loop(setup, request.tolerance)
     # As in `run_open`.
@@ -378,7 +377,7 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
         if straight:
             notes.append(StraightLines(loop.set_points))
         elif count <= MOST_SET_POINTS:
-            by_set_point = merit_by_set_point(run, plant)
+            by_set_point = merit_by_set_point(run, plant, assumed=assumed)
         else:
             notes.append(TooManySetPoints(count))
         if not by_set_point:
@@ -387,6 +386,7 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
     return RunResult(
         data=data,
         system=plant,
+        assumed=assumed,
         merit=figures,
         notes=tuple(notes),
         tracking_error=tracking_error,

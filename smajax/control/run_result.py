@@ -46,6 +46,7 @@ class RunResult:
     settings: tuple[Source, ...] = ()  # what a closed loop takes from files of gains and of models
     loop: LoopSettings | None = None  # of a closed loop: limit of the command, period, delay, filter, noise
     controller: AbstractController | None = None
+    assumed: System | None = None  # of a closed loop: the plant as the controller knows it
     # Root mean square, rad or m, over `whole_run` and `second_half`, which the way to the reference leaves out; of a reference without figures of merit.
     tracking_error: Mapping[str, float] = field(default_factory=dict)
 

@@ -134,7 +134,9 @@ def tuned_on_models(
     for name, assumed, plants, settings, found in searched:
         gains = replace(found.after, values=best_gains(assumed, settings, pool, plants=plants))
         own = gains.put(CONTROLLERS[controller].plant(assumed))
-        loops = tuple(loop_on_plant(truth, own, float(target), seconds) for target in unit.to_own(np.asarray(targets)))
+        loops = tuple(
+            loop_on_plant(truth, own, float(target), seconds, assumed) for target in unit.to_own(np.asarray(targets))
+        )
         tuned.append(TunedOnModel(name, gains, found.units, loops, float(own.largest_command())))
     return ControlComparison(controller, plant[0], unit, seconds, tuple(tuned), differing(first, plant[1]))
 
@@ -157,10 +159,12 @@ def differing(model: ModelRecord, plant: ModelRecord) -> tuple[OtherValue, ...]:
     )
 
 
-def loop_on_plant(plant: System, controller: AbstractController, set_point: float, seconds: float) -> EvaluatedLoop:
-    """The loop of a controller on a plant, from the start to one set point (rad or m)."""
+def loop_on_plant(
+    plant: System, controller: AbstractController, set_point: float, seconds: float, assumed: System | None = None
+) -> EvaluatedLoop:
+    """The loop of a controller on a plant, from the start to one set point (rad or m); `assumed` as `ClosedLoopSetup.assumed`."""
     reference = resting(jnp.full(round(seconds / STEP) + 1, set_point))
-    loop, figures, _ = measured_loop(ClosedLoopSetup(plant, controller, reference, STEP, 1))
+    loop, figures, _ = measured_loop(ClosedLoopSetup(plant, controller, reference, STEP, 1, assumed=assumed))
     return EvaluatedLoop(
         set_point,
         np.asarray(loop.run.time),

@@ -279,7 +279,7 @@ def page(
 
 def _band(result: RunResult) -> float:
     """How near counts as there in a closed loop, rad or m."""
-    return float(band_of(result.system)) if "wanted" in result.data else 0.0
+    return float(band_of(result.assumed or result.system)) if "wanted" in result.data else 0.0
 
 
 def _merit_part(result: RunResult) -> list[str]:

@@ -134,7 +134,10 @@ def merit_rule(result: RunResult) -> str:
         return ""
     of = display(result.system.load.reading[1])
     # A band of 1 degree in rad has rounding errors.
-    near, share = f"±{digits(of.of(float(band_of(result.system))), 3)} {of.unit}", f"{STEADY_SHARE:.0%}"
+    near, share = (
+        f"±{digits(of.of(float(band_of(result.assumed or result.system))), 3)} {of.unit}",
+        f"{STEADY_SHARE:.0%}",
+    )
     return (
         f"Reach time: first within {near} of the set point, or beyond it. Settling time: within {near} from then on, and over at least the last {share} of "
         f"the set point's time; a loop that is there later has not settled. Steady error: mean over the last {share}."

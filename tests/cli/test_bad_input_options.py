@@ -212,7 +212,7 @@ LONG = {
     "sweep --controllers pdi": "no controller `pdi`; did you mean 'pid'? There are: pid,",
     "sweep --controllers ,": "no controller is named, expected some of pid,",
     "sweep --controllers pid --over convection,damp": "for --over: no mismatch `damp`; did you mean 'damping'? There are: in",
-    "sweep --controllers pid --over wire_length": "for --over: no mismatch `wire_length`; there are: inertia, damping",
+    "sweep --controllers pid --over austenite_start": "for --over: `austenite_start` is a temperature, or of the start",
     "sweep --controllers pid --over damping,damping": "for --over: `damping` twice, expected one mismatch or different ones",
     "sweep --controllers pid --over convection,damping,convection_coefficient": "for --over: `convection` twice",
     "sweep --controllers pid --over convection,,damping": "for --over: no mismatch ``",

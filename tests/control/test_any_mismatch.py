@@ -36,6 +36,28 @@ def test_what_is_asked_for_is_a_mismatch_beside_those_of_the_load(load: str) -> 
     assert not [name for name in there if table[name].unit == "degC" or parameter_values(plant)[name] == 0.0]
 
 
+def test_an_arm_with_another_drive_has_the_mismatches_that_are_its() -> None:
+    by_duty, by_current = (build("niti_table_3_1", "arm", drive) for drive in ("duty", "current"))
+    assert mismatches_of(by_duty)["supply"] == "supply_voltage"
+    assert "supply" not in mismatches_of(by_current)
+    for plant in (by_duty, by_current):
+        assert set(mismatches_of(plant).values()) <= set(parameters(plant))
+        assert plant_set(plant).columns == tuple(mismatches_of(plant))
+
+
+@pytest.mark.parametrize(
+    ("over", "ratios", "said"),
+    [
+        ("recoverable_strain", (0.5, 4.0), "^4 times recoverable_strain: "),
+        ("lower_stop", (0.5, 2.0), r"^0.5 times lower_stop: the load starts at .* end stops"),
+    ],
+)
+def test_a_ratio_at_which_the_plant_is_none_is_refused(over: str, ratios: tuple[float, float], said: str) -> None:
+    settings = sweep_settings_for(PLANTS["arm"], ["pid"], first=over, second="", ratio_range=ratios)
+    with pytest.raises(ValueError, match=said):
+        settings.check(PLANTS["arm"])
+
+
 @pytest.mark.parametrize(
     ("name", "said"), [("austenite_start", "a temperature"), ("specific_haet", "did you mean 'specific_heat'")]
 )

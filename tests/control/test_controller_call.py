@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -45,12 +46,18 @@ FAULTS = {
     "if": (lambda memory, error: (memory, 2.0 if error > 0.0 else 1.0), r"`_Own.step` asks for a number .* `jnp.where"),
     "numpy": (lambda memory, error: (memory, np.clip(error, 0.0, 2.0)), r"functions of `jax.numpy` in the place of"),
     "math": (lambda memory, error: (memory, math.exp(error)), r"`_Own.step` asks for a number"),
-    "pair": (lambda memory, error: error, r"gives an array of shape \(\), expected \(memory, command\)"),
+    "pair": (lambda memory, error: error, r"gives an array of float64 of shape \(\), expected \(memory, command\)"),
     "command": (
         lambda memory, error: (memory, (error, 1)),
         r"the command of `_Own.step` is a tuple of 2, expected one",
     ),
-    "shape": (lambda memory, error: (memory, jnp.ones(2)), r"the command of `_Own.step` is an array of shape \(2,\)"),
+    "shape": (
+        lambda memory, error: (memory, jnp.ones(2)),
+        r"the command of `_Own.step` is an array of float64 of shape \(2,\)",
+    ),
+    "index": (lambda memory, error: (memory, error[error > 0.0].sum()), r"`_Own.step` asks for a number"),
+    "complex": (lambda memory, error: (memory, 1.0j * error), r"the command of `_Own.step` is an array of complex128"),
+    "text": (lambda memory, error: (memory, "2 V"), r"the command of `_Own.step` is `str`, expected one number"),
     "memory": (lambda memory, error: ((memory, error), error), r"another form than that of `start`: .* expected \(\)"),
 }
 
@@ -60,6 +67,44 @@ def test_what_is_wrong_with_the_step_of_a_controller_is_said(fault: str) -> None
     answer, said = FAULTS[fault]
     with pytest.raises(TypeError, match=said):
         simulate_closed_loop(HANGING, _Own(answer), constant(clock(1.0, 0.01), 2e-3), dt=0.01)
+
+
+class _Begun(_Own):
+    first: Callable[..., Any] = jnp.zeros_like
+
+    def start(self, measured: Any, wanted: Any) -> Any:
+        return self.first(wanted.position - measured.position)
+
+
+@pytest.mark.parametrize(
+    ("first", "said"),
+    [
+        (lambda error: 1.0 if error > 0.0 else 0.0, r"`_Begun.start` asks for a number"),
+        (lambda error: "none", r"memory that `_Begun.start` gives has `str` in it"),
+        (
+            lambda error: jnp.zeros((), int),
+            r"is float64 after `_Begun.step` and int64 before: let `start` give it as float64",
+        ),
+    ],
+)
+def test_what_is_wrong_with_the_start_of_a_controller_is_said(first: Callable[..., Any], said: str) -> None:
+    with pytest.raises(TypeError, match=said):
+        sma.simulate_loop_dataset(sma.loop_around(HANGING, _Begun(first=first)), "2 mm: 1 s", dt=0.02, period=0.02)
+
+
+@pytest.mark.parametrize(
+    ("first", "after"),
+    [
+        (lambda error: jnp.zeros((), jnp.float32), lambda memory: memory + 0.0),
+        (lambda error: jnp.zeros(()), lambda memory: 0),
+        (lambda error: (jnp.zeros(()), jax.random.key(0)), lambda memory: (0.0, jax.random.split(memory[1])[0])),
+        (lambda error: None, lambda memory: None),
+    ],
+)
+def test_a_memory_keeps_its_precision(first: Callable[..., Any], after: Callable[..., Any]) -> None:
+    own = _Begun(lambda memory, error: (after(memory), 2.0), first)
+    loop = simulate_closed_loop(HANGING, own, constant(clock(0.2, 0.01), 2e-3), dt=0.01)
+    np.testing.assert_allclose(loop.voltage[:-1], 2.0)
 
 
 def test_a_function_is_no_controller() -> None:

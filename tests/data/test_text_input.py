@@ -38,6 +38,19 @@ def test_levels_are_found_however_many_samples_show_their_noise(noises: float, s
     assert likeliest_increment(logs, increment / noises) == pytest.approx(increment, rel=0.02)
 
 
+@pytest.mark.parametrize("noises", [6.2, 12.0])
+def test_levels_that_one_run_does_not_have_are_none_of_the_sensor(noises: float) -> None:
+    rng = np.random.default_rng(8)
+    increment, strokes = 0.05 * 1e-2, [*_strokes(rng, 800), *_strokes(rng, 800)[:1]]
+    logs = [
+        (increment * np.round(stroke / increment) if run < 3 else stroke)
+        + increment / noises * rng.normal(size=stroke.size)
+        for run, stroke in enumerate(strokes)
+    ]
+    assert likeliest_increment(logs, increment / noises) == 0.0
+    assert likeliest_increment(logs[:3], increment / noises) == pytest.approx(increment, rel=0.02)
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_a_few_places_where_a_reading_rests_are_no_levels(seed: int) -> None:
     """Four a run: at some of a thousand increments they lie as if on levels."""

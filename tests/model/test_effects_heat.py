@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -92,6 +94,23 @@ def test_the_latent_heat_is_constant_or_follows_kirchhoff(contrast: float, share
     change = -contrast * m_c * np.trapezoid(temperature - neutral, fraction)
     assert abs(change) > 0.01 * own
     assert given == pytest.approx(own + counted * change, rel=1e-3)
+
+
+@pytest.mark.parametrize(("contrast", "share"), [(1.0, 0.0), (0.6, 1.0), (-0.3, 0.0)])
+def test_a_large_contrast_is_no_jump_on_heating_and_on_cooling(contrast: float, share: float) -> None:
+    system = RIGS["dead_weight"][0]
+    on = {"phase_specific_heat.contrast": contrast, "phase_specific_heat.kirchhoff": share}
+    runs = {}
+    for dt in (2.5e-4, 2e-3):
+        volts = jnp.where(jnp.arange(round(8.0 / dt) + 1) * dt < 4.0, 9.0, 0.0)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # of steps that do not converge
+            run = simulate_compiled(extended(system, ("phase_specific_heat",), on), {"voltage": volts}, dt)
+        runs[dt] = np.asarray(run.martensite_fraction)[:: round(2e-3 / dt)]
+    fine, coarse = runs.values()
+    assert fine.min() < 0.01
+    assert np.abs(np.diff(fine)).max() < 0.05
+    np.testing.assert_allclose(coarse, fine, atol=0.01)
 
 
 def test_heat_lost_to_the_ends_is_that_of_a_fin() -> None:

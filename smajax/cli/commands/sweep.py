@@ -261,8 +261,8 @@ def sweep(
     What can differ between the plant and the controller's model: inertia (inertia_ratio), damping, convection
     (convection_coefficient), ambient (ambient_temperature, in degC), payload (payload_mass), supply (amplifier_gain).
     +20% is 1.2 times the value that the controller assumes (of 20 degC: 24 degC), -50% half of it, and 20% of a variation
-    is both ways. Of another load than the arm those of these that it has. Any other parameter of the plant goes by its own name, such as
-    specific_heat or spring_stiffness, but a temperature, of which a ratio tells nothing.
+    is both ways. Of another load than the arm: those of these that it has. Any other parameter goes by its
+    own name, such as specific_heat; of a temperature a share tells nothing.
 
     Example:  smajax sweep --controllers pid,sld --over convection,ambient --out sweep
 

@@ -94,7 +94,7 @@ def _variation(several: Sequence[str] | None, plant: System) -> dict[str, float]
 
     try:
         variation = variation_of(texts("--variation", several, "damping=20%,payload=50%"))
-        check_known(tuple(variation), plant)
+        check_known(tuple(variation), plant, "variation")
         check_variation(variation, plant_set(plant, None, tuple(variation)))
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint="--variation") from None
@@ -276,8 +276,8 @@ def tune(
     What can differ between the plant and the controller's model: inertia (inertia_ratio), damping, convection
     (convection_coefficient), ambient (ambient_temperature, in degC), payload (payload_mass), supply (amplifier_gain).
     +20% is 1.2 times the value that the controller assumes (of 20 degC: 24 degC), -50% half of it, and 20% of a variation
-    is both ways. Of another load than the arm those of these that it has. Any other parameter of the plant goes by its own name, such as
-    specific_heat or spring_stiffness, but a temperature, of which a ratio tells nothing.
+    is both ways. Of another load than the arm: those of these that it has. Any other parameter goes by its
+    own name, such as specific_heat; of a temperature a share tells nothing.
 
     Example:  smajax tune pid --wire flexinol_table_3_2 --load dead_weight --drive flexinol_voltage --set-point 5mm,12mm,20mm
 

@@ -87,7 +87,7 @@ def _loop(setup: _Setup, values: dict[str, Scalar]) -> ClosedLoopSetup:
     controller = set_vector(setup.controller, [setup.main_gain], gain)
     plant = perturbed_plant(setup.system, values, setup.perturbation)
     wanted = constant(setup.time, values[TARGET])
-    return ClosedLoopSetup(plant, controller, wanted, integration=setup.integration, **interface)
+    return ClosedLoopSetup(plant, controller, wanted, integration=setup.integration, assumed=setup.system, **interface)
 
 
 def _merits(setup: _Setup, values: dict[str, Scalar]) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from smajax.control.controllers.base import AbstractController
 from smajax.control.figures_of_merit import Merit
 from smajax.control.gains_file import Gains
 from smajax.control.least_time import Distance, command_limit, distance
-from smajax.control.mismatch import MISMATCHES, default_mismatches
+from smajax.control.mismatch import MISMATCHES, check_ratios_of, default_mismatches
 from smajax.control.plants import Plants, PlantSet, carrying, plant_set
 from smajax.control.position_unit import PositionUnit, check_unit, default_set_points, unit_named, unit_of
 from smajax.control.presets import CONTROLLERS, check_controller, code_of_parts, controllers_for
@@ -130,6 +130,8 @@ class SweepSettings:
             )
         found = plant_set(system, plants, self.mismatches)
         _ = self.grid_on(found)  # it checks itself
+        if found.batch is None:
+            check_ratios_of(system, dict.fromkeys(self.mismatches, self.ratio_range), found.table)
         return found
 
 

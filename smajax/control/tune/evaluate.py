@@ -86,9 +86,11 @@ def _loop(problem: _Problem, values: dict[str, Scalar], point: Scalar) -> tuple[
     controller = set_vector(problem.controller, problem.names, jnp.exp(problem.low + point * problem.width))
     if problem.smoothed is not None:
         controller = problem.smoothed(controller, problem.softness * problem.length)
-    observer = term_observer(merit_observer(plant, wanted), problem.softness)
+    observer = term_observer(merit_observer(plant, wanted, assumed=problem.system), problem.softness)
     settings = problem.interface.settings(problem.time[1] - problem.time[0], problem.key, values[NUMBER])
-    setup = ClosedLoopSetup(plant, controller, wanted, integration=problem.integration, **settings)
+    setup = ClosedLoopSetup(
+        plant, controller, wanted, integration=problem.integration, assumed=problem.system, **settings
+    )
     return observe_closed_loop(observer, setup)[0]
 
 

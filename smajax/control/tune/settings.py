@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from smajax.control.gains_file import fixed_parameters
+from smajax.control.mismatch import check_ratios_of
 from smajax.control.plants import Plants, PlantSet, plant_set
 from smajax.control.position_unit import (
     PositionUnit,
@@ -84,6 +85,8 @@ class TuneSettings:
             raise ValueError(f"every set point once, not {', '.join(f'{angle:g}' for angle in self.set_points)}.")
         found = plant_set(system, plants, tuple(self.variation))
         check_variation(self.variation, found)
+        sides = {name: (1.0 - share, 1.0 + share) for name, share in self.variation.items()}
+        check_ratios_of(system, sides, found.table)
         if self.batch != (0 if found.batch is None else len(found.batch)):
             raise ValueError(
                 f"the settings say {self.batch} plants of a batch, and {plants!r} was given: use `settings_for`."

@@ -41,8 +41,8 @@ def likeliest_increment(readings: Sequence[Array], sigma: float) -> float:
     not how long the reading rests at its ends, every reading weighs one over the number of those within half an increment of it:
     the weights of a run add up to the levels that it was on. Of a run with m levels the squared sum of turns over m has by chance
     the exponential distribution, and several runs' together that of the sum (Scargle 1982). Rests at even distances, as of a staircase of
-    set points, are told from levels by the way between them: a sensor's readings are on levels there too, but for one at each change. Less than
-    seven noises apart no reading is between levels, and such rests count as levels.
+    set points, are told from levels by the way between them: a sensor's readings are on levels there too, but for one at each change. Of rests
+    less than nine noises apart, between which the reading passes in a few samples, this is not to be seen, and they count as levels.
     """
     stroke = max(float(np.ptp(one)) for one in readings)
     finest = max(LEAST * sigma, stroke * FINENESS / MOST)
@@ -54,13 +54,45 @@ def likeliest_increment(readings: Sequence[Array], sigma: float) -> float:
     tried = 1.0 + best / FINENESS
     chance = tried * float(scipy.special.gammaincc(len(readings), surprise[best]))
     increment = float(1.0 / frequency[best])
-    all_on_levels = math.exp(-2.0 * (math.pi * sigma / increment) ** 2)
-    found = (
-        strength[best] > ON_LEVELS * all_on_levels
-        and chance < CHANCE
-        and _on_levels_throughout(readings, increment, sigma)
-    )
-    return increment if found else 0.0
+    if not (strength[best] > ON_LEVELS * _left_by(sigma, increment) and chance < CHANCE):
+        return 0.0
+    # Where the noise is less than was said, more is asked.
+    own = min(sigma, _scatter(readings, increment))
+    found = strength[best] > ON_LEVELS * _left_by(own, increment) and _on_levels_throughout(readings, increment, own)
+    return increment if found and _in_every_run(readings, increment, own, cell) else 0.0
+
+
+def _left_by(sigma: float, increment: float) -> float:
+    """Of the periodogram at the increment, by normal noise about levels: exp(-2 pi^2 sigma^2 / q^2)."""
+    return math.exp(-2.0 * (math.pi * sigma / increment) ** 2)
+
+
+def _from_levels(one: Array, increment: float) -> tuple[Array, Array]:
+    """(number of the nearest level, distance from it in levels) of each reading of a run, whose zero is that of most readings."""
+    turns = np.exp(2j * np.pi * (one - one[0]) / increment)
+    phase = float(np.angle(turns.sum())) / (2.0 * np.pi)
+    levels = (one - one[0]) / increment - phase
+    nearest = np.round(levels)
+    return nearest, levels - nearest
+
+
+def _scatter(readings: Sequence[Array], increment: float) -> float:
+    """Root mean square distance of the readings from their levels."""
+    away = np.concatenate([_from_levels(one, increment)[1] for one in readings])
+    return increment * float(np.sqrt(np.mean(away**2)))
+
+
+def _in_every_run(readings: Sequence[Array], increment: float, sigma: float, cell: float) -> bool:
+    """Whether each run that goes over `FEWEST` levels is on levels by itself."""
+    least, half = 0.5 * ON_LEVELS * _left_by(sigma, increment), max(round(0.5 * increment / cell), 1)
+    for one in readings:
+        if np.ptp(one) > FEWEST * increment:
+            run = _cells(one, cell)
+            weight = _weights(run, half)
+            turns = np.exp(2j * np.pi * run.where * cell / increment)
+            if abs((weight * turns).sum()) < least * weight.sum():
+                return False
+    return True
 
 
 def _cells(readings: Array, cell: float) -> _Cells:
@@ -106,10 +138,7 @@ def _on_levels_throughout(readings: Sequence[Array], increment: float, sigma: fl
     """Whether no more readings are between levels than one at each change of the level."""
     between, changes, least = 0, 0, max(BETWEEN * sigma, NEAR * increment)
     for one in readings:
-        turns = np.exp(2j * np.pi * (one - one[0]) / increment)
-        # The level of most readings is one of a run's levels, wherever its zero is.
-        phase = float(np.angle(turns.sum())) / (2.0 * np.pi)
-        levels = (one - one[0]) / increment - phase
-        between += int((np.abs(levels - np.round(levels)) * increment > least).sum())
-        changes += int(np.abs(np.diff(np.round(levels))).sum())
+        nearest, away = _from_levels(one, increment)
+        between += int((np.abs(away) * increment > least).sum())
+        changes += int(np.abs(np.diff(nearest)).sum())
     return between <= changes + FEW * sum(len(one) for one in readings)

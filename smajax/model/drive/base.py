@@ -37,10 +37,6 @@ class AbstractDrive(eqx.Module):
         """Command above which it puts no more into the wire, in the unit of `command`; infinite where there is none."""
         return math.inf
 
-    def commanded_as(self, assumed: AbstractDrive) -> AbstractDrive:
-        """This drive, whose commands are turned into inputs by what `assumed`, that of the controller's model, says of the amplifier."""
-        return self
-
     def from_command(self, command: Scalar) -> Inputs:
         """The inputs by which a controller's command (0 or more) reaches the wire. ValueError for a drive that takes none."""
         return self.from_voltage(command)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from typing import ClassVar
 
 import jax.numpy as jnp
@@ -16,8 +15,6 @@ class Duty(AbstractDrive):
     """Mean power = duty * V_s^2 / (R l_0^2) per metre: the wire is far slower than the modulation."""
 
     supply_voltage: Scalar = parameter("V", 0.1, 1e3, "voltage of the supply while the switch is closed")
-    # V, the supply by which a command in V is turned into a duty, where that is believed to be another; not a property of the plant.
-    assumed_supply: Scalar | None = None
 
     inputs_required: ClassVar[frozenset[str]] = frozenset({"duty"})
 
@@ -33,11 +30,7 @@ class Duty(AbstractDrive):
     def largest_command(self) -> Scalar:
         return self.supply_voltage
 
-    def commanded_as(self, assumed: AbstractDrive) -> Duty:
-        return dataclasses.replace(self, assumed_supply=assumed.supply_voltage) if isinstance(assumed, Duty) else self
-
     def from_voltage(self, voltage: Scalar) -> Inputs:
-        """The duty that heats as `voltage` would, by the supply that is believed to be there; all of the supply is the most there is."""
-        supply = self.supply_voltage if self.assumed_supply is None else self.assumed_supply
-        duty = (voltage / supply) ** 2
+        """The duty that heats as `voltage` would; all of the supply is the most there is."""
+        duty = (voltage / self.supply_voltage) ** 2
         return {"duty": jnp.where(duty > 1.0, 1.0, duty)}

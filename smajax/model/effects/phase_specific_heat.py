@@ -13,7 +13,7 @@ from smajax.model.types import Scalar
 from smajax.model.wire.heat import HeatState, HeatTerm, mass_per_metre
 from smajax.model.wire.wire import Wire
 
-# Kirchhoff's change of the latent heat alone, far from T_0, would turn a transformation into a jump.
+# a k beyond which Kirchhoff's change of the latent heat alone, far from T_0, would turn a transformation into a jump.
 MOST_KIRCHHOFF = 0.3
 
 
@@ -27,11 +27,11 @@ class PhaseSpecificHeat(AbstractEffect, HeatTerm):
     With k = 1 heat is a function of the state, $m c_p^M a (1 - \xi)(T - T_0)$ beside the base model's, and the heat of
     transformation changes with temperature; it is that of the base model at $T_0 = (M_s + A_f)/2$ (Tong and Wayman 1974).
     With k = 0 it stays that of the base model at any temperature: $m c_p(\xi) \dot T$ in eq. 3.1 and no more, as a specific
-    heat of each phase and one latent heat are commonly put together. Of a change beyond 0.3, k is at most 0.3 / |a|: more would
-    turn a transformation far from T_0 into a jump.
+    heat of each phase and one latent heat are commonly put together; heat is then no function of the state. Where a > 0.3, the share that
+    counts is 0.3 k/a: with more, the heat of transformation would turn a transformation far from T_0 into a jump.
     """
 
-    contrast: Scalar = parameter("-", -0.5, 1.0, "a: relative change of c_p from martensite to austenite", default=0.0)
+    contrast: Scalar = parameter("-", -0.3, 1.0, "a: relative change of c_p from martensite to austenite", default=0.0)
     kirchhoff: Scalar = parameter(
         "-", 0.0, 1.0, "k: share of Kirchhoff's change of the heat of transformation", default=1.0
     )
@@ -54,16 +54,23 @@ class PhaseSpecificHeat(AbstractEffect, HeatTerm):
         },
     )
 
-    def _more(self, wire: Wire, temperature: Scalar) -> Scalar:
-        """Heat of austenite over martensite's, J/m, that the difference of c_p makes."""
-        law = wire.kinetics
-        beyond = temperature - 0.5 * (law.martensite_start + law.austenite_finish)
-        return mass_per_metre(wire) * wire.heat.specific_heat * self.contrast * beyond
+    def _share(self) -> Scalar:
+        """Of Kirchhoff's change that counts."""
+        return self.kirchhoff * (MOST_KIRCHHOFF / jnp.maximum(self.contrast, MOST_KIRCHHOFF))
 
     def stored_heat(self, wire: Wire, temperature: Scalar, fraction: Scalar) -> Scalar | float:
-        return self._more(wire, temperature) * (1.0 - fraction)
+        law = wire.kinetics
+        beyond = temperature - 0.5 * (law.martensite_start + law.austenite_finish)
+        return self._share() * self._more(wire) * (1.0 - fraction) * beyond
 
     def heat_loss(self, wire: Wire, at: HeatState) -> Scalar | float:
-        there = self._more(wire, 0.5 * (at.old.temperature + at.temperature))
-        share = self.kirchhoff * (MOST_KIRCHHOFF / jnp.maximum(jnp.abs(self.contrast), MOST_KIRCHHOFF))
-        return (1.0 - share) * there * (at.fraction - at.old.martensite_fraction) / at.duration
+        # A capacity, and not the difference of a stored heat and a heat of transformation: in the stages of a step these weigh differently,
+        # and of a large contrast what is left between them would turn a transformation into a jump.
+        austenite = 1.0 - 0.5 * (at.fraction + at.old.martensite_fraction)
+        return (
+            (1.0 - self._share()) * self._more(wire) * austenite * (at.temperature - at.old.temperature) / at.duration
+        )
+
+    def _more(self, wire: Wire) -> Scalar:
+        """Heat capacity of austenite over martensite's, J/(K m)."""
+        return mass_per_metre(wire) * wire.heat.specific_heat * self.contrast
