@@ -33,6 +33,8 @@ from smajax.simulation.simulate import DEFAULT_STEP, warn_of_length
 
 PERIOD = 0.01  # s, of the controller
 BEYOND = 0.01  # of the way between the end stops: from there on a set point is a mistake
+ESTIMATE = "estimated_"  # before the name of a variable: what the filter makes of it
+ESTIMATED = ("position", "velocity", "stress", "temperature", "martensite_fraction")
 SAMPLED = "sampled"  # attribute of a `reading` that is no state of the plant: the sensor's, held for a control period
 
 
@@ -54,11 +56,17 @@ class Loop(eqx.Module):
 
 
 def labelled_loop(
-    system: System, loop: ClosedLoop, error: IntegrationError | None = None, **settings: object
+    system: System,
+    loop: ClosedLoop,
+    error: IntegrationError | None = None,
+    *,
+    estimated: bool = False,
+    **settings: object,
 ) -> xr.Dataset:
     """A closed loop as `labelled_run`, with the command `voltage` (V; of such a drive `current` or `power`) and the position `wanted`.
 
-    Where a sensor reads the position, `reading` is what it says: with its noise and steps, once a control period and held; `position` is the true one.
+    Where a sensor reads the position, `reading` is what it says: with its noise and steps, once a control period and held; `position` is the true one. estimated: what the controller was told is a
+    filter's estimate, and is `estimated_position`, `estimated_temperature` and so on, beside the true ones.
     A mapping among the settings, such as `gains`, becomes JSON.
     """
     attributes = {name: json.dumps(dict(one)) if isinstance(one, Mapping) else one for name, one in settings.items()}
@@ -70,6 +78,13 @@ def labelled_loop(
             SAMPLED: "once a control period, with the noise and steps of the sensor",
         }
         result["reading"] = ("time", np.asarray(loop.reading), {**result["reading"].attrs, **of_sensor})
+    for name in ESTIMATED if estimated else ():
+        of_filter = {
+            "long_name": f"{result[name].attrs.get('long_name', name)}, as the filter estimates it",
+            "units": result[name].attrs["units"],
+            SAMPLED: "once a control period, as the controller is told",
+        }
+        result[f"{ESTIMATE}{name}"] = ("time", np.asarray(getattr(loop.measured, name)), of_filter)
     result["wanted"] = ("time", np.asarray(loop.wanted.position), {"units": position, "long_name": "set point"})
     return result
 
@@ -127,6 +142,7 @@ def simulate_loop_dataset(
         system,
         run,
         error,
+        estimated=loop.estimator is not None,
         dt=dt,
         period=period,
         controller=type(controller).__name__,

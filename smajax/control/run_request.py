@@ -355,6 +355,7 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
         plant,
         run,
         error,
+        estimated=interface.estimator is not None,
         dt=request.dt,
         controller=gains.controller,
         gains=parameter_values(controller),

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from smajax.control.figures_of_merit import STEADY_SHARE, SetPointMerit, band_of, merit_units
-from smajax.control.loop_dataset import SAMPLED
+from smajax.control.loop_dataset import ESTIMATE, SAMPLED
 from smajax.control.mismatch import in_words
 from smajax.control.run_notes import NotResolved
 from smajax.control.run_request import MEASURED
@@ -83,6 +83,7 @@ def summary_rows(data: xr.Dataset) -> list[list[str]]:
     """A row a variable: least, greatest, last, in the units that a reader sees; the reading where it is not the true value."""
     rows = []
     logged = [f"{MEASURED}{name}" for name in measured_of(data)]
+    logged += [str(name) for name in data.data_vars if str(name).startswith(ESTIMATE)]
     for name, one in data.drop_vars([*_redundant(data), *logged]).data_vars.items():
         unit, values = display(one.attrs["units"], str(name)), one.to_numpy()
         least, greatest, last = float(values.min()), float(values.max()), float(values[-1])
