@@ -69,7 +69,7 @@ def test_how_far_a_loop_moves_depends_on_its_noise() -> None:
     back = peaks("feedforward_pi", 1)
     assert np.median(back) == pytest.approx(2.2, abs=0.05)
     assert max(back) == pytest.approx(2.9, abs=0.05)
-    assert np.sum(np.asarray(peaks("receding_horizon", 0)) > 1.0) == 4
+    assert np.sum(np.asarray(peaks("receding_horizon", 0)) > 1.0) == 3
 
 
 @pytest.mark.parametrize("count", [10, 11, 12])

@@ -126,14 +126,12 @@ class Corrected(AbstractRenewal):
         # Off both branches a curve ahead of the wire is its memory of where it turned back: that one stays.
         heating = transforming | beyond(xi - old.xi_M * h)
         cooling = transforming | beyond(1.0 - (1.0 - old.xi_A) * k - xi)
-        # Of a fraction that is put elsewhere, the curve that the wire was kept from is not known.
-        lost_heating = jnp.where(old.heating_missed != 0.0, UNKNOWN, 0.0)
-        lost_cooling = jnp.where(old.cooling_missed != 0.0, UNKNOWN, 0.0)
+        # Of a fraction that is put elsewhere, however little, the curve that the wire was kept from is not known.
         return Amplitudes(
             jnp.where(heating, laid.xi_M, old.xi_M),
             jnp.where(cooling, laid.xi_A, old.xi_A),
-            jnp.where(heating, laid.heating_missed, lost_heating),
-            jnp.where(cooling, laid.cooling_missed, lost_cooling),
+            jnp.where(old.heating_missed != 0.0, UNKNOWN, jnp.where(heating, laid.heating_missed, 0.0)),
+            jnp.where(old.cooling_missed != 0.0, UNKNOWN, jnp.where(cooling, laid.cooling_missed, 0.0)),
         )
 
     @staticmethod
